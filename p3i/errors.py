@@ -1,0 +1,34 @@
+"""The errors that p3i raises on purpose, each with the exit code that the command line gives it."""
+
+
+class P3IError(Exception):
+    """Base of every error that p3i raises on purpose; its text is the sentence that a user reads.
+
+    `exit_code` is what the command line returns for it (docs/errors.md lists all codes).
+    """
+
+    exit_code = 70
+
+
+class UsageError(P3IError):
+    """The call itself cannot be carried out: options that contradict each other, a value out of range."""
+
+    exit_code = 2
+
+
+class FileError(P3IError):
+    """A file cannot be read, is not what it should be, or cannot be written."""
+
+    exit_code = 3
+
+
+class ProgramError(P3IError):
+    """A program cannot be parsed, or cannot do what was asked of it."""
+
+    exit_code = 4
+
+
+class NoPatternError(P3IError):
+    """A photo shows no regular pattern that p3i would vouch for."""
+
+    exit_code = 5
