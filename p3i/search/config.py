@@ -1,0 +1,87 @@
+"""The one record of options that the search takes: the Python API and the command line both read it.
+
+Each field carries the sentence that documents it, so `p3i synth --help` and `help(SearchConfig)` cannot
+differ. Imports neither torch nor numpy: `p3i synth --help` reads this file.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from p3i.errors import UsageError
+
+Structure = Literal["auto", "lattice"]
+Extent = Literal["found", "image"]
+
+STRUCTURES: tuple[Structure, ...] = ("auto", "lattice")
+EXTENTS: tuple[Extent, ...] = ("found", "image")
+FEATURES: tuple[str, ...] = ("gradients", "rgb", "lite0", "alexnet")
+"""The names of p3i.vision.features.EXTRACTORS, repeated here so that `--help` need not load torch."""
+
+
+def _option(default: Any, sentence: str) -> Any:
+    """A field with its default and the one sentence that the help of command line and API shows."""
+    return dataclasses.field(default=default, metadata={"help": sentence})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchConfig:
+    """What to look for in a photo, and with which means.
+
+    Raises UsageError for a value out of range. What depends on the photo (its mask, its focal by EXIF)
+    belongs to the image, not here.
+    """
+
+    structure: Structure = _option("auto", "The kind of pattern to look for; auto tries all kinds.")
+    features: str = _option("gradients", "The features in which parts of the photo are compared.")
+    weights: Path | None = _option(None, "A file with the weights of the features (alexnet needs one).")
+    focal_mm: float | None = _option(
+        None, "35 mm-equivalent focal length; by default that of the photo's EXIF data, else 35."
+    )
+    extent: Extent = _option(
+        "found", "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
+    )
+    strict: bool = _option(False, "Fit and print programs of the paper's Table 1 only.")
+    seed: int = _option(0, "Seed of everything random; equal seeds give equal programs.")
+    time_s: float | None = _option(
+        None, "Seconds after which the best program so far is the answer; by default there is no limit."
+    )
+    top: int = _option(1, "How many candidates to report, the best first.")
+    device: str = _option("auto", "Where to compute: auto, cpu, cuda, or another device of torch.")
+    threads: int = _option(1, "Threads to compute with; one is fastest at these sizes (docs/decisions).")
+
+    def __post_init__(self) -> None:
+        if self.structure in ("circular", "hybrid"):
+            raise UsageError(f"--structure {self.structure} is not there yet: this version finds lattices")
+        _one_of("structure", self.structure, STRUCTURES)
+        _one_of("features", self.features, FEATURES)
+        _one_of("extent", self.extent, EXTENTS)
+        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        if self.time_s is not None and not self.time_s > 0:
+            raise UsageError(f"the time must be more than 0 seconds, not {self.time_s:g}")
+        if self.top < 1:
+            raise UsageError(f"the number of candidates must be at least 1, not {self.top}")
+        if self.threads < 1:
+            raise UsageError(f"the number of threads must be at least 1, not {self.threads}")
+        if self.seed < 0:
+            raise UsageError(f"a seed is a whole number from 0, not {self.seed}")
+        if self.features == "alexnet" and self.weights is None:
+            raise UsageError("the features alexnet need a file with their weights: --weights FILE")
+
+
+def sentence(name: str) -> str:
+    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
+    return {item.name: item.metadata["help"] for item in dataclasses.fields(SearchConfig)}[name]
+
+
+def default(name: str) -> Any:
+    """The default of the field `name`; raises KeyError where there is no such field."""
+    return {item.name: item.default for item in dataclasses.fields(SearchConfig)}[name]
+
+
+def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise UsageError(f"{name} is one of {', '.join(allowed)}, not {value!r}")

@@ -1,0 +1,71 @@
+"""What a search returns: a program or the reason why there is none, and the evidence for either.
+
+Imports neither torch nor numpy.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal
+
+from p3i.grammar.ast import Program
+
+StructureFound = Literal["lattice", "circular", "hybrid"]
+FocalSource = Literal["option", "header", "exif", "default"]
+
+
+class StopReason(Enum):
+    """Why a search ended. The value is the sentence that the user reads; an answer needs none.
+
+    TIME_UP and INTERRUPTED may come with a program (the best so far) or without one; FOUND always comes
+    with one, the others never do. `synthesize` turns a KeyboardInterrupt into INTERRUPTED.
+    """
+
+    FOUND = ""
+    TIME_UP = "the time was up before the search had ended"
+    INTERRUPTED = "interrupted before the search had ended"
+    NO_PATTERN = "no regular pattern"
+    TOO_SMALL = "the picture is too small to hold a pattern"
+    FLAT = "the picture has too little contrast to hold a pattern"
+    TOO_LITTLE_KNOWN = "too few pixels of the picture are known (the rest is masked or transparent)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """One program that the search weighed, with its normalised score (docs/geometry.md)."""
+
+    program: Program
+    score: float
+    structure: StructureFound
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisResult:
+    """The answer for one photo.
+
+    `program` is None where nothing convinced; then `score` is the best that was seen, if any, and
+    `needed` what an answer must reach. `margin` is the lead over the best candidate of another meaning.
+    `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
+    and the loop indices (i, j). `candidates` are in order, the best first, at most `SearchConfig.top`.
+    `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
+    """
+
+    program: Program | None
+    stop: StopReason
+    structure: StructureFound | None = None
+    score: float | None = None
+    margin: float | None = None
+    needed: float | None = None
+    candidates: tuple[Candidate, ...] = ()
+    centers: tuple[tuple[float, float, int, int], ...] = ()
+    focal_mm: float = 35.0
+    focal_source: FocalSource = "default"
+    features: str = ""
+    seed: int = 0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why the search ended, as a sentence with its numbers; empty where there is nothing to explain."""
+        if self.stop is StopReason.NO_PATTERN and self.score is not None and self.needed is not None:
+            return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
+        return self.stop.value
