@@ -8,7 +8,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, get_type_hints
 
 from p3i.errors import UsageError
 
@@ -21,11 +21,6 @@ FEATURES: tuple[str, ...] = ("gradients", "rgb", "lite0", "alexnet")
 """The names of p3i.vision.features.EXTRACTORS, repeated here so that `--help` need not load torch."""
 
 
-def _option(default: Any, sentence: str) -> Any:
-    """A field with its default and the one sentence that the help of command line and API shows."""
-    return dataclasses.field(default=default, metadata={"help": sentence})
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchConfig:
     """What to look for in a photo, and with which means.
@@ -34,23 +29,23 @@ class SearchConfig:
     belongs to the image, not here.
     """
 
-    structure: Structure = _option("auto", "The kind of pattern to look for; auto tries all kinds.")
-    features: str = _option("gradients", "The features in which parts of the photo are compared.")
-    weights: Path | None = _option(None, "A file with the weights of the features (alexnet needs one).")
-    focal_mm: float | None = _option(
-        None, "35 mm-equivalent focal length; by default that of the photo's EXIF data, else 35."
-    )
-    extent: Extent = _option(
-        "found", "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
-    )
-    strict: bool = _option(False, "Fit and print programs of the paper's Table 1 only.")
-    seed: int = _option(0, "Seed of everything random; equal seeds give equal programs.")
-    time_s: float | None = _option(
-        None, "Seconds after which the best program so far is the answer; by default there is no limit."
-    )
-    top: int = _option(1, "How many candidates to report, the best first.")
-    device: str = _option("auto", "Where to compute: auto, cpu, cuda, or another device of torch.")
-    threads: int = _option(1, "Threads to compute with; one is fastest at these sizes (docs/decisions).")
+    structure: Annotated[Structure, "The kind of pattern to look for; auto tries all kinds."] = "auto"
+    features: Annotated[str, "The features in which parts of the photo are compared."] = "gradients"
+    weights: Annotated[Path | None, "A file with the weights of the features (alexnet needs one)."] = None
+    focal_mm: Annotated[
+        float | None, "35 mm-equivalent focal length; by default that of the photo's EXIF data, else 35."
+    ] = None
+    extent: Annotated[
+        Extent, "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
+    ] = "found"
+    strict: Annotated[bool, "Fit and print programs of the paper's Table 1 only."] = False
+    seed: Annotated[int, "Seed of everything random; equal seeds give equal programs."] = 0
+    time_s: Annotated[
+        float | None, "Seconds after which the best program so far is the answer; no limit by default."
+    ] = None
+    top: Annotated[int, "How many candidates to report, the best first."] = 1
+    device: Annotated[str, "Where to compute: auto, cpu, cuda, or another device of torch."] = "auto"
+    threads: Annotated[int, "Threads to compute with; one is fastest at these sizes."] = 1
 
     def __post_init__(self) -> None:
         if self.structure in ("circular", "hybrid"):
@@ -74,12 +69,12 @@ class SearchConfig:
 
 def sentence(name: str) -> str:
     """The sentence that documents the field `name`; raises KeyError where there is no such field."""
-    return {item.name: item.metadata["help"] for item in dataclasses.fields(SearchConfig)}[name]
+    return get_type_hints(SearchConfig, include_extras=True)[name].__metadata__[0]
 
 
 def default(name: str) -> Any:
     """The default of the field `name`; raises KeyError where there is no such field."""
-    return {item.name: item.default for item in dataclasses.fields(SearchConfig)}[name]
+    return {field.name: field.default for field in dataclasses.fields(SearchConfig)}[name]
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:
