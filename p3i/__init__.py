@@ -1,0 +1,66 @@
+"""p3i: from one slanted photo of a plane with a repeating pattern to the camera and a short program.
+
+    import p3i
+
+    result = p3i.synth("tiles.jpg")
+    print(p3i.format(result.program))
+
+Every name is loaded when it is first used: `p3i.check` and `p3i.format` never import torch.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from p3i.api import read_image, render, score, synth
+    from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
+    from p3i.grammar.ast import Program
+    from p3i.interp.camera import Camera
+    from p3i.language import check, dump, dumps, expand, format, load, loads
+    from p3i.search.config import SearchConfig
+    from p3i.search.result import StopReason, SynthesisResult
+
+_HOMES = {
+    "Camera": "p3i.interp.camera",
+    "FileError": "p3i.errors",
+    "NoPatternError": "p3i.errors",
+    "P3IError": "p3i.errors",
+    "Program": "p3i.grammar.ast",
+    "ProgramError": "p3i.errors",
+    "SearchConfig": "p3i.search.config",
+    "StopReason": "p3i.search.result",
+    "SynthesisResult": "p3i.search.result",
+    "UsageError": "p3i.errors",
+    "check": "p3i.language",
+    "dump": "p3i.language",
+    "dumps": "p3i.language",
+    "expand": "p3i.language",
+    "format": "p3i.language",
+    "load": "p3i.language",
+    "loads": "p3i.language",
+    "read_image": "p3i.api",
+    "render": "p3i.api",
+    "score": "p3i.api",
+    "synth": "p3i.api",
+}
+
+__all__ = [  # noqa: RUF022  # in the order of use
+    "synth", "render", "score", "check", "format", "expand",
+    "load", "loads", "dump", "dumps", "read_image",
+    "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason",
+    "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'p3i' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value  # so that this function is asked once for each name
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

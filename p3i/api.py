@@ -1,0 +1,166 @@
+"""The commands as functions: what `p3i synth`, `render`, `check`, ... do, for Python programs.
+
+Functions load what they need when they are called, so that importing this module costs nothing.
+"""
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from p3i.errors import UsageError
+from p3i.grammar.ast import Header, Program
+from p3i.language import check, dump, dumps, expand, format, load, loads
+from p3i.search.config import SearchConfig
+from p3i.search.result import SynthesisResult
+
+if TYPE_CHECKING:
+    from p3i.search.score import Evaluation
+    from p3i.size import Size
+    from p3i.vision.image import Image
+
+__all__ = [  # noqa: RUF022  # in the order of use
+    "synth", "render", "score", "check", "format", "expand",
+    "load", "loads", "dump", "dumps", "read_image",
+]  # fmt: skip
+
+Polygon = tuple[tuple[float, float], ...]
+Progress = Callable[[str, float], None]
+Trace = Callable[[Mapping[str, Any]], None]
+
+
+def read_image(path: str | os.PathLike[str], *, max_px: int | None = None) -> "Image":
+    """The photo at `path`, upright, RGB in 0..1, with its mask of known pixels and its focal.
+
+    `max_px` bounds width times height. Raises FileError with a sentence for what cannot be read.
+    """
+    from p3i.vision.image import read_image as read
+
+    return read(Path(path)) if max_px is None else read(Path(path), max_px=max_px)
+
+
+def synth(
+    photo: "str | os.PathLike[str] | Image",
+    config: SearchConfig | None = None,
+    *,
+    mask: "str | os.PathLike[str] | Image | None" = None,
+    roi: Polygon | None = None,
+    beside: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    trace: Trace | None = None,
+    **options: Any,
+) -> SynthesisResult:
+    """Find the camera and the program of the pattern on `photo`.
+
+    `options` are fields of SearchConfig and change `config`: `synth("a.jpg", seed=1, time_s=5)`. White
+    pixels of `mask` and pixels outside the polygon `roi` ((x, y) in pixels) are unknown: never evidence.
+    The header of the program names the photo relative to the folder `beside` (default: the working
+    folder), and holds the canvas, the focal and the facts of the fit, but no times.
+
+    Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
+    UsageError for options that cannot be, FileError for a photo or mask that cannot be read.
+    """
+    from p3i.search.synthesize import synthesize
+
+    known = {field.name for field in dataclasses.fields(SearchConfig)}
+    if unknown := sorted(options.keys() - known):
+        raise UsageError(f"synth has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
+    config = dataclasses.replace(config or SearchConfig(), **options)
+    path = Path(photo) if isinstance(photo, str | os.PathLike) else None
+    image = read_image(path) if path is not None else photo
+    assert not isinstance(image, str | os.PathLike)
+    image = _without(image, mask=mask, roi=roi)
+    result = synthesize(image, config, progress=progress, trace=trace)
+    return _with_headers(result, size=image.size, name=_relative(path, Path(beside or ".")))
+
+
+def score(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str],
+    config: SearchConfig | None = None,
+) -> "Evaluation":
+    """How well `program` explains `photo`: equation 2 as printed in the paper, and the normalised score.
+
+    Raises FileError or ParseError where photo or program cannot be read.
+    """
+    from p3i.search.score import evaluate
+
+    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    tree = program if isinstance(program, Program) else load(Path(program))
+    return evaluate(image, tree, config or SearchConfig())
+
+
+def render(*arguments: Any, **options: Any) -> Any:
+    """Draw a program; see p3i.paint.draw.render, whose arguments these are."""
+    from p3i.paint.draw import render as draw
+
+    return draw(*arguments, **options)
+
+
+def _without(
+    image: "Image", *, mask: "str | os.PathLike[str] | Image | None", roi: Polygon | None
+) -> "Image":
+    """`image` with the white pixels of `mask` and those outside `roi` made unknown."""
+    if mask is None and roi is None:
+        return image
+    import cv2
+    import numpy as np
+
+    valid = np.array(image.valid, dtype=bool, copy=True)
+    if mask is not None:
+        hidden = read_image(mask) if isinstance(mask, str | os.PathLike) else mask
+        if hidden.size != image.size:
+            raise UsageError(
+                f"the mask has {hidden.size.width} x {hidden.size.height} pixels, "
+                f"the photo {image.size.width} x {image.size.height}"
+            )
+        valid &= ~((np.asarray(hidden.pixels).mean(axis=2) > 0.5) & np.asarray(hidden.valid))
+    if roi is not None:
+        if len(roi) < 3 or not all(math.isfinite(value) for point in roi for value in point):
+            raise UsageError("a region of interest is a polygon of three points or more")
+        inside = np.zeros(valid.shape, np.uint8)
+        cv2.fillPoly(inside, [np.round(np.array(roi)).astype(np.int32)], 1)
+        valid &= inside.astype(bool)
+    if not valid.any():
+        raise UsageError("mask and region of interest leave no pixel of the photo")
+    return dataclasses.replace(image, valid=valid)
+
+
+def _relative(path: Path | None, folder: Path) -> str | None:
+    """`path` as seen from `folder`, with slashes; absolute only where no relative path exists."""
+    if path is None:
+        return None
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # another drive of Windows
+        return path.absolute().as_posix()
+
+
+def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) -> SynthesisResult:
+    """`result` with the header of DESIGN 2.5 on each of its programs."""
+
+    def titled(program: Program, structure: str, score: float, margin: float | None) -> Program:
+        facts: dict[str, str | int | float] = {"structure": structure, "score": round(score, 4)}
+        if margin is not None:
+            facts["margin"] = round(margin, 4)
+        facts |= {"features": result.features, "focal_from": result.focal_source, "seed": result.seed}
+        header = Header(
+            canvas=(size.width, size.height),
+            focal_mm=result.focal_mm,
+            image=name,
+            fit=tuple(facts.items()),
+        )
+        return dataclasses.replace(program, header=header)
+
+    candidates = tuple(
+        dataclasses.replace(
+            candidate, program=titled(candidate.program, candidate.structure, candidate.score, None)
+        )
+        for candidate in result.candidates
+    )
+    if result.program is None:
+        return dataclasses.replace(result, candidates=candidates)
+    program = titled(result.program, result.structure or "lattice", result.score or 0.0, result.margin)
+    return dataclasses.replace(result, program=program, candidates=candidates)

@@ -1,0 +1,129 @@
+"""`p3i`: the table of commands, and the one place where an error becomes a line and an exit code.
+
+Commands are imported when they are called, so `p3i --help` and `p3i check` start without torch.
+"""
+
+import contextlib
+import difflib
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import click
+
+from p3i.cli import report
+from p3i.errors import P3IError
+
+
+class Entry(NamedTuple):
+    """A line of the command table: the module that holds `command`, and what `p3i --help` says of it."""
+
+    module: str
+    summary: str
+
+
+COMMANDS: dict[str, Entry] = {
+    "synth": Entry("p3i.cli.synth", "Find the camera and the program of a photo's pattern."),
+    "render": Entry("p3i.cli.render", "Draw a program as PNG, SVG or PDF, also over its photo."),
+    "check": Entry("p3i.cli.check", "Report what is wrong, or odd, in programs."),
+    "fmt": Entry("p3i.cli.fmt", "Rewrite programs in their canonical text."),
+    "expand": Entry("p3i.cli.expand", "List the objects that a program draws."),
+    "score": Entry("p3i.cli.score", "Say how well a program explains a photo."),
+}
+"""In the order of `p3i --help`: the main job first."""
+
+
+class LazyGroup(click.Group):
+    """A click group whose commands are named in COMMANDS and imported only when they run."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        return importlib.import_module(COMMANDS[cmd_name].module).command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            close = difflib.get_close_matches(name, COMMANDS, n=1)
+            advice = f"did you mean `p3i {close[0]}`?" if close else "`p3i --help` lists the commands"
+            raise click.UsageError(f"there is no command `{name}`; {advice}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, entry.summary) for name, entry in COMMANDS.items()])
+
+
+def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from p3i import __version__
+
+        click.echo(f"p3i {__version__}")
+        ctx.exit()
+
+
+@click.command(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Exit codes: 0 done, 1 fmt --check differs, 2 usage, 3 a file, 4 a program, 5 no pattern, "
+    "6 some of many failed, 70 a bug, 130 interrupted.",
+)
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Version."
+)
+def cli() -> None:
+    """From one slanted photo of a plane with a repeating pattern to the camera's tilt and a short program."""
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Run the command line `argv` (without the program's name) and return the exit code; never raises.
+
+    P3IError gives its own code, wrong usage 2, an interrupt 130, a closed pipe 141 without a word, and
+    anything unforeseen 70 with one line (P3I_DEBUG=1 shows the traceback).
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    as_json = report.wants_json(words)
+    try:
+        outcome = cli.main(args=words, prog_name="p3i", standalone_mode=False)
+        sys.stdout.flush()
+        # bool is an int too, and a command that returns True has not failed.
+        return outcome if type(outcome) is int else 0
+    except P3IError as error:
+        return report.p3i_error(error, as_json=as_json)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.ctx.get_help() if error.ctx else str(error), err=True)
+        return 2
+    except click.ClickException as error:
+        return report.click_error(error, as_json=as_json)
+    except BrokenPipeError:
+        _silence_stdout()
+        return 141
+    except (KeyboardInterrupt, click.Abort):
+        report.line("interrupted", as_json=as_json, code=130)
+        return 130
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else 0 if leaving.code is None else 70
+    except Exception as error:
+        return report.bug(error, as_json=as_json)
+
+
+def _silence_stdout() -> None:
+    """Point stdout at nothing, so that the interpreter's last flush does not complain of the closed pipe."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def main() -> None:
+    """The console script `p3i`."""
+    sys.exit(run())
+
+
+if __name__ == "__main__":
+    main()

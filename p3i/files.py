@@ -1,0 +1,74 @@
+"""Naming and writing files: inputs from files, globs and folders; outputs whole or not at all."""
+
+import glob
+import os
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from p3i.errors import FileError
+
+
+def gather(words: Iterable[str], *, suffixes: Collection[str]) -> list[Path]:
+    """The files that `words` name: files as they are, globs expanded, folders listed by `suffixes`.
+
+    Order is that of the words, by name within a glob or a folder; each file comes once. A word that names
+    a file is never read as a glob. A name that does not exist is kept, so that its reader reports it.
+    Raises FileError where a folder or a glob holds nothing.
+    """
+    found: dict[Path, None] = {}
+    for word in words:
+        path = Path(word)
+        if path.is_dir():
+            members = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes and p.is_file())
+            if not members:
+                raise FileError(f"the folder {word} holds no file of a known kind")
+        elif not path.exists() and glob.has_magic(word):
+            members = sorted(p for p in map(Path, glob.glob(word, recursive=True)) if p.is_file())
+            if not members:
+                raise FileError(f"no file matches {word}")
+        else:
+            members = [path]
+        found.update(dict.fromkeys(members))
+    return list(found)
+
+
+def names_folder(text: str) -> bool:
+    """Whether the output `text` means a folder: one that exists, or a name that ends with a slash."""
+    return text.endswith(("/", os.sep)) or Path(text).is_dir()
+
+
+def check_writable(path: Path, *, force: bool) -> None:
+    """Raise FileError now for what `replacing` would refuse later, before minutes of work are spent."""
+    if path.is_dir():
+        raise FileError(f"cannot write {path}: it is a folder")
+    if path.exists() and not force:
+        raise FileError(f"{path} exists already; --force overwrites it")
+    if not path.parent.is_dir():
+        raise FileError(f"cannot write {path}: there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise FileError(f"cannot write {path}: the folder {path.parent} may not be written to")
+
+
+@contextmanager
+def replacing(path: Path, *, force: bool, mode: str = "w") -> Iterator[IO[str] | IO[bytes]]:
+    """A file to write to that takes the place of `path` when the block ends well, and vanishes otherwise.
+
+    `mode` is "w" (UTF-8, LF) or "wb". It is written beside `path` and renamed, so `path` is never half
+    written. Raises FileError for all that the system refuses, and where `path` exists without `force`.
+    """
+    check_writable(path, force=force)
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
+    try:
+        with open(beside, mode, **text) as stream:
+            yield stream
+        os.replace(beside, path)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        with suppress(OSError):
+            beside.unlink()
