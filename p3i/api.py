@@ -17,6 +17,8 @@ from p3i.search.config import SearchConfig
 from p3i.search.result import SynthesisResult
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from p3i.search.score import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
@@ -38,15 +40,16 @@ def read_image(path: str | os.PathLike[str], *, max_px: int | None = None) -> "I
     """
     from p3i.vision.image import read_image as read
 
-    return read(Path(path)) if max_px is None else read(Path(path), max_px=max_px)
+    return read(path) if max_px is None else read(path, max_px=max_px)
 
 
 def synth(
     photo: "str | os.PathLike[str] | Image",
     config: SearchConfig | None = None,
     *,
-    mask: "str | os.PathLike[str] | Image | None" = None,
+    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
     roi: Polygon | None = None,
+    max_px: int | None = None,
     beside: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     trace: Trace | None = None,
@@ -54,9 +57,9 @@ def synth(
 ) -> SynthesisResult:
     """Find the camera and the program of the pattern on `photo`.
 
-    `options` are fields of SearchConfig and change `config`: `synth("a.jpg", seed=1, time_s=5)`. White
-    pixels of `mask` and pixels outside the polygon `roi` ((x, y) in pixels) are unknown: never evidence.
-    The header of the program names the photo relative to the folder `beside` (default: the working
+    `options` are fields of SearchConfig and change `config`: `synth("a.jpg", seed=1, time_s=5)`. What is
+    white in the picture `mask`, or True in the array `mask` [H, W], and what lies outside the polygon `roi`
+    ((x, y) in pixels) is unknown: never evidence. `max_px` bounds width times height of a photo that is read here. The header of the program names the photo relative to the folder `beside` (default: the working
     folder), and holds the canvas, the focal and the facts of the fit, but no times.
 
     Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
@@ -68,12 +71,14 @@ def synth(
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"synth has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
     config = dataclasses.replace(config or SearchConfig(), **options)
-    path = Path(photo) if isinstance(photo, str | os.PathLike) else None
-    image = read_image(path) if path is not None else photo
-    assert not isinstance(image, str | os.PathLike)
-    image = _without(image, mask=mask, roi=roi)
-    result = synthesize(image, config, progress=progress, trace=trace)
-    return _with_headers(result, size=image.size, name=_relative(path, Path(beside or ".")))
+    image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
+    result = synthesize(_without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
+    name = None
+    if isinstance(photo, str | os.PathLike) and os.fspath(photo) != "-":
+        name = _relative(Path(photo), Path(beside or "."))
+    heard = tuple(note for note in image.notes if note not in result.notes)
+    result = dataclasses.replace(result, notes=heard + result.notes)
+    return _with_headers(result, size=image.size, name=name)
 
 
 def score(
@@ -100,38 +105,37 @@ def render(*arguments: Any, **options: Any) -> Any:
 
 
 def _without(
-    image: "Image", *, mask: "str | os.PathLike[str] | Image | None", roi: Polygon | None
+    image: "Image", *, mask: "str | os.PathLike[str] | np.ndarray | None", roi: Polygon | None
 ) -> "Image":
-    """`image` with the white pixels of `mask` and those outside `roi` made unknown."""
+    """`image` with what `mask` marks, and what lies outside `roi`, made unknown."""
     if mask is None and roi is None:
         return image
     import cv2
     import numpy as np
 
-    valid = np.array(image.valid, dtype=bool, copy=True)
-    if mask is not None:
-        hidden = read_image(mask) if isinstance(mask, str | os.PathLike) else mask
-        if hidden.size != image.size:
-            raise UsageError(
-                f"the mask has {hidden.size.width} x {hidden.size.height} pixels, "
-                f"the photo {image.size.width} x {image.size.height}"
-            )
-        valid &= ~((np.asarray(hidden.pixels).mean(axis=2) > 0.5) & np.asarray(hidden.valid))
+    from p3i.vision.image import masked, read_mask
+
+    if isinstance(mask, str | os.PathLike):
+        image = masked(image, read_mask(mask, image.size))
+    elif mask is not None:
+        if mask.shape != image.valid.shape or mask.dtype != np.bool_:
+            raise UsageError(f"a mask is bool {image.valid.shape}, not {mask.dtype} {mask.shape}")
+        image = masked(image, mask)
     if roi is not None:
         if len(roi) < 3 or not all(math.isfinite(value) for point in roi for value in point):
             raise UsageError("a region of interest is a polygon of three points or more")
-        inside = np.zeros(valid.shape, np.uint8)
-        cv2.fillPoly(inside, [np.round(np.array(roi)).astype(np.int32)], 1)
-        valid &= inside.astype(bool)
-    if not valid.any():
-        raise UsageError("mask and region of interest leave no pixel of the photo")
-    return dataclasses.replace(image, valid=valid)
+        inside = np.zeros(image.valid.shape, np.uint8)
+        # OpenCV counts in whole numbers; beyond a picture's largest side a corner's place is all the same.
+        corners = np.clip(np.round(np.array(roi)), -(2**20), 2**20).astype(np.int32)
+        cv2.fillPoly(inside, [corners], 1)
+        image = masked(image, inside == 0)
+    if not image.valid.any():
+        raise UsageError("mask and region of interest leave nothing of the photo")
+    return image
 
 
-def _relative(path: Path | None, folder: Path) -> str | None:
+def _relative(path: Path, folder: Path) -> str:
     """`path` as seen from `folder`, with slashes; absolute only where no relative path exists."""
-    if path is None:
-        return None
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # another drive of Windows

@@ -52,17 +52,16 @@ def check_writable(path: Path, *, force: bool) -> None:
 
 
 @contextmanager
-def replacing(path: Path, *, force: bool, mode: str = "w") -> Iterator[IO[str] | IO[bytes]]:
-    """A file to write to that takes the place of `path` when the block ends well, and vanishes otherwise.
+def replacing(path: Path, *, force: bool) -> Iterator[IO[str]]:
+    """A text file (UTF-8, LF) that takes the place of `path` if the block ends well, and vanishes if not.
 
-    `mode` is "w" (UTF-8, LF) or "wb". It is written beside `path` and renamed, so `path` is never half
+    It is written beside `path` and renamed, so `path` is never half
     written. Raises FileError for all that the system refuses, and where `path` exists without `force`.
     """
     check_writable(path, force=force)
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
     try:
-        with open(beside, mode, **text) as stream:
+        with open(beside, "w", encoding="utf-8", newline="\n") as stream:
             yield stream
         os.replace(beside, path)
     except OSError as error:
@@ -72,3 +71,11 @@ def replacing(path: Path, *, force: bool, mode: str = "w") -> Iterator[IO[str] |
     finally:
         with suppress(OSError):
             beside.unlink()
+
+
+def make_folder(path: Path) -> None:
+    """Make the folder `path` and those above it, where they do not exist; raises FileError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make the folder {path}: {error.strerror or error}") from error

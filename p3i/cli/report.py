@@ -32,14 +32,21 @@ def coloured() -> bool:
 
 
 def line(
-    message: str, *, as_json: bool = False, code: int | None = None, kind: str = "error", **facts: object
+    message: str,
+    *,
+    as_json: bool = False,
+    code: int | None = None,
+    kind: str = "error",
+    image: str | None = None,
 ) -> None:
-    """Write one line on stderr: `error: message`, or a JSON object with `error`, `code` and the facts."""
+    """Write one line on stderr: `error: message`, or a JSON object with `image`, `error` and `code`.
+
+    `kind` stands in the place of `error` for what is none: "note", "info".
+    """
     message = " ".join(message.split())
     if as_json:
-        record: dict[str, object] = {**facts, kind: message}
-        if code is not None:
-            record["code"] = code
+        record = {"image": image, kind: message, "code": code}
+        record = {name: value for name, value in record.items() if value is not None}
         click.echo(json.dumps(record, ensure_ascii=False), err=True)
         return
     colour = "red" if kind == "error" else "yellow"
@@ -47,9 +54,9 @@ def line(
     click.echo(f"{prefix} {message}", err=True, color=coloured())
 
 
-def p3i_error(error: P3IError, *, as_json: bool = False, **facts: object) -> int:
+def p3i_error(error: P3IError, *, as_json: bool = False, image: str | None = None) -> int:
     """Report an error that p3i raised on purpose; returns its exit code."""
-    line(str(error), as_json=as_json, code=error.exit_code, **facts)
+    line(str(error), as_json=as_json, code=error.exit_code, image=image)
     return error.exit_code
 
 
@@ -64,11 +71,11 @@ def click_error(error: click.ClickException, *, as_json: bool = False) -> int:
     return code
 
 
-def bug(error: BaseException, *, as_json: bool = False, **facts: object) -> int:
+def bug(error: BaseException, *, as_json: bool = False, image: str | None = None) -> int:
     """Report an exception that nobody foresaw, in one line; returns 70. P3I_DEBUG=1 adds the traceback."""
     if os.environ.get("P3I_DEBUG"):
         traceback.print_exception(error)
-    line(bug_sentence(error), as_json=as_json, code=70, **facts)
+    line(bug_sentence(error), as_json=as_json, code=70, image=image)
     return 70
 
 
