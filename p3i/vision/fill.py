@@ -1,0 +1,39 @@
+"""Unknown pixels: filled from what surrounds them, and kept away from what is known."""
+
+import cv2
+import numpy as np
+
+
+def filled(array: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """The array with its unknown pixels replaced by a smooth continuation of the known ones.
+
+    Shapes: array [H, W, C] float32 with C <= 4, valid bool [H, W] -> [H, W, C]. Push-pull: the known pixels
+    are averaged down a pyramid, and what is unknown is read from the first level that knows. The values
+    of unknown pixels are never read. Where nothing at all is known the answer is 0.
+    """
+    if valid.all():
+        return array
+    weight = valid.astype(np.float32)
+    return _push_pull(np.where(valid[:, :, None], array, np.float32(0)), weight)
+
+
+def eroded(valid: np.ndarray, radius: int) -> np.ndarray:
+    """Where the whole square of `radius` pixels around is known; beyond the frame nothing is. Bool [H, W]."""
+    if radius == 0:
+        return valid
+    kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
+    mask = valid.astype(np.uint8)
+    return cv2.erode(mask, kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0).astype(bool)  # pyright: ignore[reportCallIssue, reportArgumentType]
+
+
+def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """`weighted` is value times weight [H, W, C]; weight in 0..1 [H, W]; returns the value everywhere."""
+    value = weighted / np.maximum(weight, 1e-6)[:, :, None]
+    height, width = weight.shape
+    if weight.min() >= 1 or max(height, width) == 1:
+        return value
+    half = (max(1, (width + 1) // 2), max(1, (height + 1) // 2))
+    smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], -1)
+    smaller_weight = cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
+    coarse = cv2.resize(_push_pull(smaller, smaller_weight), (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.where(weight[:, :, None] >= 1, value, coarse.reshape(value.shape))
