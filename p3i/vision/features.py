@@ -9,8 +9,10 @@ from torch import Tensor
 
 from p3i.errors import UsageError
 from p3i.size import Size
+from p3i.vision.alexnet import alexnet
 from p3i.vision.fill import filled
 from p3i.vision.image import Image, resized
+from p3i.vision.lite0 import lite0
 from p3i.vision.normalize import locally_normalized, principal, unit_energy
 from p3i.vision.oriented import lab_of, oriented
 from p3i.vision.raw import RawFeatures
@@ -60,10 +62,18 @@ def _oriented(image: Image, weights: Path | None) -> RawFeatures:
     return oriented(image)
 
 
+def _lite0(image: Image, weights: Path | None) -> RawFeatures:
+    return lite0(image)
+
+
 EXTRACTORS: dict[str, Extractor] = {
     "oriented": _oriented,
     "rgb": _rgb,
+    "lite0": _lite0,
+    "alexnet": alexnet,
 }
+# Those that read the file given with --weights.
+_WITH_WEIGHTS = {"alexnet"}
 DEFAULT = "oriented"
 
 
@@ -80,8 +90,8 @@ def extract(
     `name` is a key of EXTRACTORS, or several joined by `+`, whose maps are put together at the finest of
     their strides with equal energy. The photo is first reduced to `longer` pixels on its longer side (None:
     as it is; it is never enlarged). Each feature is reduced to its `channels` principal components.
-    `weights` is the weight file of an extractor that asks for one. Raises UsageError for an unknown name or
-    fewer than one channel, and what the extractors raise.
+    `weights` is the weight file of an extractor that asks for one. Raises UsageError for an unknown name,
+    weights that nobody asks for, or fewer than one channel, and what the extractors raise.
     """
     if channels < 1:
         raise UsageError(f"features need at least one channel, not {channels}")
@@ -89,6 +99,8 @@ def extract(
     for part in names:
         if part not in EXTRACTORS:
             raise UsageError(f"there is no feature {part!r}; p3i knows {', '.join(EXTRACTORS)}")
+    if weights is not None and not _WITH_WEIGHTS & set(names):
+        raise UsageError(f"--weights is for {', '.join(sorted(_WITH_WEIGHTS))}; {name} needs no weight file")
     working = image if longer is None else resized(image, longer)
     maps = [_normalized(EXTRACTORS[part](working, weights), channels) for part in names]
     found = maps[0] if len(maps) == 1 else _together(maps, working.size)
