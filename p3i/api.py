@@ -59,8 +59,9 @@ def synth(
 
     `options` are fields of SearchConfig and change `config`: `synth("a.jpg", seed=1, time_s=5)`. What is
     white in the picture `mask`, or True in the array `mask` [H, W], and what lies outside the polygon `roi`
-    ((x, y) in pixels) is unknown: never evidence. `max_px` bounds width times height of a photo that is read here. The header of the program names the photo relative to the folder `beside` (default: the working
-    folder), and holds the canvas, the focal and the facts of the fit, but no times.
+    ((x, y) in pixels) is unknown: never evidence. `max_px` bounds width times height of a photo that is
+    read here. The header of the program names the photo relative to the folder `beside` (default: the
+    working folder), and holds the canvas, the focal and the facts of the fit, but no times.
 
     Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
     UsageError for options that cannot be, FileError for a photo or mask that cannot be read.

@@ -8,7 +8,7 @@ import click
 
 from p3i import api
 from p3i.cli import options
-from p3i.search.config import FEATURES, SearchConfig, default, sentence
+from p3i.search.config import SearchConfig, default, sentence
 
 
 @click.command("score", short_help="Say how well a program explains a photo.")
@@ -25,7 +25,7 @@ from p3i.search.config import FEATURES, SearchConfig, default, sentence
 @click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @click.option(
     "--features",
-    type=click.Choice(FEATURES),
+    metavar="NAME",
     default=default("features"),
     show_default=True,
     help=sentence("features"),

@@ -15,7 +15,7 @@ from p3i import api, files
 from p3i.cli import options, progress, report
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
-from p3i.search.config import EXTENTS, FEATURES, STRUCTURES, SearchConfig, default, sentence
+from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, sentence
 from p3i.search.result import StopReason, SynthesisResult
 
 
@@ -47,7 +47,7 @@ from p3i.search.result import StopReason, SynthesisResult
 @click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @click.option(
     "--features",
-    type=click.Choice(FEATURES),
+    metavar="NAME",
     default=default("features"),
     show_default=True,
     help=sentence("features"),

@@ -17,7 +17,7 @@ Extent = Literal["found", "image"]
 
 STRUCTURES: tuple[Structure, ...] = ("auto", "lattice")
 EXTENTS: tuple[Extent, ...] = ("found", "image")
-FEATURES: tuple[str, ...] = ("gradients", "rgb", "lite0", "alexnet")
+FEATURES: tuple[str, ...] = ("oriented", "rgb", "lite0", "alexnet")
 """The names of p3i.vision.features.EXTRACTORS, repeated here so that `--help` need not load torch."""
 
 
@@ -30,7 +30,9 @@ class SearchConfig:
     """
 
     structure: Annotated[Structure, "The kind of pattern to look for; auto tries all kinds."] = "auto"
-    features: Annotated[str, "The features in which parts of the photo are compared."] = "gradients"
+    features: Annotated[
+        str, f"What parts of the photo are compared by: {', '.join(FEATURES)}, or several joined by +."
+    ] = "oriented"
     weights: Annotated[Path | None, "A file with the weights of the features (alexnet needs one)."] = None
     focal_mm: Annotated[
         float | None, "35 mm-equivalent focal length; by default that of the photo's EXIF data, else 35."
@@ -51,7 +53,9 @@ class SearchConfig:
         if self.structure in ("circular", "hybrid"):
             raise UsageError(f"--structure {self.structure} is not there yet: this version finds lattices")
         _one_of("structure", self.structure, STRUCTURES)
-        _one_of("features", self.features, FEATURES)
+        parts = [part.strip() for part in self.features.split("+")]
+        for part in parts:
+            _one_of("features", part, FEATURES)
         _one_of("extent", self.extent, EXTENTS)
         if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
             raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
@@ -63,8 +67,8 @@ class SearchConfig:
             raise UsageError(f"the number of threads must be at least 1, not {self.threads}")
         if self.seed < 0:
             raise UsageError(f"a seed is a whole number from 0, not {self.seed}")
-        if self.features == "alexnet" and self.weights is None:
-            raise UsageError("the features alexnet need a file with their weights: --weights FILE")
+        if ("alexnet" in parts) != (self.weights is not None):
+            raise UsageError("the features alexnet, and only they, need a file with weights (--weights FILE)")
 
 
 def sentence(name: str) -> str:
