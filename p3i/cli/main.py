@@ -8,6 +8,7 @@ import difflib
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -91,7 +92,7 @@ def run(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     as_json = report.wants_json(words)
     try:
-        outcome = cli.main(args=words, prog_name="p3i", standalone_mode=False)
+        outcome = _invoke(words)
         sys.stdout.flush()
         # bool is an int too, and a command that returns True has not failed.
         return outcome if type(outcome) is int else 0
@@ -114,6 +115,19 @@ def run(argv: Sequence[str] | None = None) -> int:
         return report.bug(error, as_json=as_json)
 
 
+def _invoke(words: list[str]) -> object:
+    """Run the command line; what click's own `main` does, without its words on interrupts and closed pipes."""
+    if instruction := os.environ.get("_P3I_COMPLETE"):
+        from click.shell_completion import shell_complete
+
+        return shell_complete(cli, {}, "p3i", "_P3I_COMPLETE", instruction)
+    try:
+        with cli.make_context("p3i", words) as context:
+            return cli.invoke(context)
+    except click.exceptions.Exit as leaving:
+        return leaving.exit_code
+
+
 def _silence_stdout() -> None:
     """Point stdout at nothing, so that the interpreter's last flush does not complain of the closed pipe."""
     with contextlib.suppress(OSError, ValueError):
@@ -122,6 +136,10 @@ def _silence_stdout() -> None:
 
 def main() -> None:
     """The console script `p3i`."""
+    if not os.environ.get("P3I_DEBUG"):
+        # Libraries warn their programmers, not our users, to whom each answer says what they need to know.
+        warnings.simplefilter("ignore")
+        os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     sys.exit(run())
 
 

@@ -1,0 +1,143 @@
+"""The import table of the house (docs/README.md): who may import whom, and where heavy packages may stand."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "p3i"
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+# The parts of p3i that each part may import besides itself; leaves may be imported by all.
+LEAVES = {"p3i.errors", "p3i.size", "p3i.files"}
+GRAMMAR, INTERP, VISION, SEARCH, PAINT = "p3i.grammar", "p3i.interp", "p3i.vision", "p3i.search", "p3i.paint"
+ALLOWED: dict[str, set[str]] = {
+    "p3i.errors": set(),
+    "p3i.size": set(),
+    "p3i.files": set(),
+    GRAMMAR: set(),
+    INTERP: {GRAMMAR},
+    VISION: set(),
+    SEARCH: {GRAMMAR, INTERP, VISION},
+    PAINT: {GRAMMAR, INTERP, VISION},
+    # The torch-free functions of the API: what `p3i check` runs.
+    "p3i.language": {GRAMMAR, INTERP},
+    "p3i.api": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language"},
+    "p3i.cli": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
+    "p3i.evaluation": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
+    # The package itself re-exports lazily, and imports nothing.
+    "p3i": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
+}
+HEAVY = {"torch", "torchvision", "numpy", "cv2", "PIL", "scipy", "rich"}
+GRAMMAR_MAY_IMPORT = {"lark"}
+# Files that must be importable without any heavy package: what `--help`, `check`, `fmt` and `expand` load.
+LIGHT = ["p3i", "p3i.api", "p3i.language", "p3i.cli", "p3i.grammar", *sorted(LEAVES)]
+LIGHT += ["p3i.search.config", "p3i.search.result", "p3i.search.record", "p3i.interp.unroll"]
+# Packages whose own file must be empty of imports, since importing any part of them runs it.
+BARE = ["p3i.cli", "p3i.grammar", "p3i.interp", "p3i.search", "p3i.vision", "p3i.paint"]
+
+
+def module_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def part_of(module: str) -> str:
+    """The part of the table that a module of p3i belongs to."""
+    two = ".".join(module.split(".")[:2])
+    return two if two in ALLOWED else "p3i"
+
+
+def imports(path: Path, *, inside_functions: bool, for_types: bool = True) -> Iterator[tuple[str, int]]:
+    """The modules that a file imports, with their lines; those under TYPE_CHECKING too if `for_types`."""
+
+    def walk(node: ast.AST) -> Iterator[tuple[str, int]]:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef) and not inside_functions:
+                continue
+            if (
+                isinstance(child, ast.If)
+                and isinstance(child.test, ast.Name)
+                and child.test.id == "TYPE_CHECKING"
+                and not for_types
+            ):
+                continue
+            if isinstance(child, ast.Import):
+                yield from ((alias.name, child.lineno) for alias in child.names)
+            elif isinstance(child, ast.ImportFrom):
+                assert child.level == 0, f"{path}:{child.lineno}: write imports in full"
+                assert child.module is not None
+                # `from p3i.cli import options` imports the module p3i.cli.options.
+                inner = [f"{child.module}.{alias.name}" for alias in child.names]
+                modules = {module_of(file) for file in FILES}
+                yield from ((name if name in modules else child.module, child.lineno) for name in inner)
+            else:
+                yield from walk(child)
+
+    return walk(ast.parse(path.read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize("path", FILES, ids=module_of)
+def test_a_file_imports_only_what_its_part_may(path: Path) -> None:
+    part = part_of(module_of(path))
+    allowed = ALLOWED[part] | LEAVES | {part}
+    for name, line in imports(path, inside_functions=True):
+        if name == "p3i" or name.startswith("p3i."):
+            assert name == "p3i" or part_of(name) in allowed, f"{path}:{line}: {part} may not import {name}"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "grammar").glob("*.py")), ids=module_of)
+def test_grammar_imports_lark_and_the_standard_library_only(path: Path) -> None:
+    import sys
+
+    for name, line in imports(path, inside_functions=True):
+        top = name.split(".")[0]
+        known = top == "p3i" or top in GRAMMAR_MAY_IMPORT or top in sys.stdlib_module_names
+        assert known, f"{path}:{line}: grammar may not import {name}"
+
+
+def light_files() -> list[Path]:
+    def is_light(module: str) -> bool:
+        return any(module == name or (name != "p3i" and module.startswith(f"{name}.")) for name in LIGHT)
+
+    return [path for path in FILES if is_light(module_of(path))]
+
+
+@pytest.mark.parametrize("path", light_files(), ids=module_of)
+def test_light_files_import_heavy_packages_inside_functions_only(path: Path) -> None:
+    light = set(map(module_of, light_files())) | set(BARE)
+    for name, line in imports(path, inside_functions=False, for_types=False):
+        assert name.split(".")[0] not in HEAVY, f"{path}:{line}: import {name} inside a function"
+        if name.startswith("p3i."):
+            assert name in light, f"{path}:{line}: {name} loads torch or cv2; import it inside a function"
+
+
+@pytest.mark.parametrize("name", BARE)
+def test_the_package_files_import_nothing(name: str) -> None:
+    path = PACKAGE.parent.joinpath(*name.split(".")) / "__init__.py"
+    assert list(imports(path, inside_functions=False, for_types=False)) == []
+
+
+@pytest.mark.parametrize("path", FILES, ids=module_of)
+def test_no_file_is_a_bag_or_longer_than_400_lines(path: Path) -> None:
+    assert path.stem not in {"utils", "util", "helpers", "common", "misc", "tools"}
+    lines = path.read_text(encoding="utf-8").count("\n")
+    assert lines <= 400, f"{module_of(path)} has {lines} lines; split it"
+
+
+def test_one_function_alone_calls_grid_sample_and_prints_stay_in_the_command_line() -> None:
+    samplers = [module_of(path) for path in FILES for name in called(path) if name == "grid_sample"]
+    assert samplers in ([], ["p3i.vision.warp"])
+    printers = {module_of(path) for path in FILES for name in called(path) if name == "print"}
+    assert not {name for name in printers if not name.startswith("p3i.cli")}
+
+
+def called(path: Path) -> Iterator[str]:
+    """The bare names of the functions that a file calls."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            if isinstance(node.func, ast.Name):
+                yield node.func.id
+            elif isinstance(node.func, ast.Attribute):
+                yield node.func.attr
