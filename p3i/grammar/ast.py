@@ -12,6 +12,7 @@ from typing import Literal
 
 Variable = Literal["i", "j"]
 Function = Literal["Cos", "Sin"]
+FitValue = str | int | float | bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +69,13 @@ class Draw:
     span: Span | None = field(default=None, compare=False, repr=False)
     comments: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
+    def __post_init__(self) -> None:
+        path = self.picture
+        if path is not None and (
+            not path or "\0" in path or any("\ud800" <= mark <= "\udfff" for mark in path)
+        ):
+            raise ValueError(f"no file can have the path {path!r}")
+
 
 @dataclass(frozen=True, slots=True)
 class If:
@@ -113,14 +121,18 @@ class Header:
     """The optional TOML block in comments; what it does not say is None.
 
     `canvas` is (width, height) in pixels, `focal_mm` the 35 mm-equivalent focal of docs/geometry.md,
-    `image` a path relative to the program, `fit` the facts that `synth` wrote down, in order.
+    `image` a path relative to the program, `fit` the facts that `synth` wrote down, in order. `lines` is
+    the block as it was written, which the printer repeats as long as it says the same as the fields;
+    `comments` stand above the block.
     """
 
     version: int = 1
     canvas: tuple[int, int] | None = None
     focal_mm: float | None = None
     image: str | None = None
-    fit: tuple[tuple[str, str | int | float | bool], ...] = ()
+    fit: tuple[tuple[str, FitValue], ...] = ()
+    lines: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    comments: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
