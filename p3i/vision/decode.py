@@ -194,7 +194,7 @@ def _is_deep(picture: Pil.Image, data: bytes) -> bool:
     """Whether Pillow would cut the picture down to 8 bits."""
     if picture.format == "PNG":
         return len(data) > 24 and data[24] == 16
-    if picture.format == "TIFF":
+    if picture.format == "TIFF" and data[2:4] in (b"*\0", b"\0*"):  # BigTIFF is left to Pillow
         tags = picture.tag_v2  # pyright: ignore[reportAttributeAccessIssue]
         depths = tags.get(258, (1,))
         return max(depths if isinstance(depths, tuple) else (depths,)) > 8 and tags.get(262) in (0, 1, 2)
@@ -202,7 +202,8 @@ def _is_deep(picture: Pil.Image, data: bytes) -> bool:
 
 
 def _opencv_array(data: bytes) -> np.ndarray | None:
-    """The picture as OpenCV reads it, channels in RGB order, not turned by EXIF; None if it cannot."""
+    """The picture as OpenCV reads it, channels in RGB order, as stored (not turned); None if it cannot."""
+    data = _without_tiff_orientation(data)
     array = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if array is not None and array.ndim == 3 and array.shape[2] >= 3:
         array = swap_red_blue(array)
@@ -221,23 +222,34 @@ def _decode_with_opencv_only(data: bytes, *, name: str, max_px: int) -> Decoded:
     return _from_array(_turned(array, orientation), kind=kind)
 
 
-def _tiff_header(data: bytes) -> tuple[str, Size, int] | None:
-    """Size and orientation of a TIFF's first page, from its tags; None if it is no TIFF."""
+def _tiff_tags(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """(tag, first value as a number, where the value stands) of a TIFF's first page; nothing for others."""
     order = {b"II*\0": "<", b"MM\0*": ">"}.get(data[:4])
     if order is None:
-        return None
+        return
     (offset,) = struct.unpack_from(order + "I", data, 4)
     (count,) = struct.unpack_from(order + "H", data, offset)
-    tags = {}
-    for entry in range(count):
-        tag, kind = struct.unpack_from(order + "HH", data, offset + 2 + 12 * entry)
-        if tag in (256, 257, 274):
-            (tags[tag],) = struct.unpack_from(
-                order + ("H" if kind == 3 else "I"), data, offset + 10 + 12 * entry
-            )
+    for at in range(offset + 2, offset + 2 + 12 * count, 12):
+        tag, kind = struct.unpack_from(order + "HH", data, at)
+        (value,) = struct.unpack_from(order + ("H" if kind == 3 else "I"), data, at + 8)
+        yield tag, value, at + 8
+
+
+def _tiff_header(data: bytes) -> tuple[str, Size, int] | None:
+    """Size and orientation of a TIFF's first page, from its tags; None if it is no TIFF."""
+    tags = {tag: value for tag, value, _ in _tiff_tags(data)}
     if not (tags.get(256) and tags.get(257)):
         return None
-    return "TIFF", Size(tags[256], tags[257]), tags.get(274, 1)
+    return "TIFF", Size(tags[256], tags[257]), tags.get(ORIENTATION, 1)
+
+
+def _without_tiff_orientation(data: bytes) -> bytes:
+    """The file with its orientation tag set to upright: OpenCV turns TIFFs even where it is told not to."""
+    for tag, value, at in _tiff_tags(data):
+        if tag == ORIENTATION and value != 1:
+            upright = b"\1\0\0\0" if data[:2] == b"II" else b"\0\1\0\0"
+            return data[:at] + upright + data[at + 4 :]
+    return data
 
 
 def _float_header(data: bytes) -> tuple[str, Size, int] | None:

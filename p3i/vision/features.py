@@ -12,9 +12,10 @@ from p3i.size import Size
 from p3i.vision.alexnet import alexnet
 from p3i.vision.fill import filled
 from p3i.vision.image import Image, resized
+from p3i.vision.lab import lab_of
 from p3i.vision.lite0 import lite0
 from p3i.vision.normalize import locally_normalized, principal, unit_energy
-from p3i.vision.oriented import lab_of, oriented
+from p3i.vision.oriented import oriented
 from p3i.vision.raw import RawFeatures
 from p3i.vision.warp import pixel_grid, sample, sample_valid
 

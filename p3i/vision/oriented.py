@@ -6,6 +6,7 @@ import torch
 
 from p3i.vision.fill import eroded, filled
 from p3i.vision.image import Image
+from p3i.vision.lab import lab_of
 from p3i.vision.raw import RawFeatures
 
 # Width of the Gaussian, in pixels of the working image (DESIGN.md, 4.1).
@@ -39,8 +40,3 @@ def oriented(image: Image) -> RawFeatures:
         np.multiply(xx - yy, factor, out=planes[3 * channel + 1])
         np.multiply(gx * gy, 2 * factor, out=planes[3 * channel + 2])
     return RawFeatures(torch.from_numpy(planes), torch.from_numpy(eroded(image.valid, _REACH)), 1.0)
-
-
-def lab_of(pixels: np.ndarray) -> np.ndarray:
-    """sRGB in 0..1 -> CIE Lab (D65): L in 0..100, a and b about -128..127. float32 [H, W, 3]."""
-    return cv2.cvtColor(pixels, cv2.COLOR_RGB2LAB)
