@@ -116,7 +116,7 @@ def run(argv: Sequence[str] | None = None) -> int:
 
 
 def _invoke(words: list[str]) -> object:
-    """Run the command line; what click's own `main` does, without its words on interrupts and closed pipes."""
+    """Run the command line as `main` of click does, but silent on interrupts and closed pipes."""
     if instruction := os.environ.get("_P3I_COMPLETE"):
         from click.shell_completion import shell_complete
 

@@ -1,0 +1,340 @@
+"""The shell of `p3i synth`, around a search that is told what to answer by the colour of the photo."""
+
+import json
+import shlex
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from p3i.cli.main import run
+from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
+from p3i.search.config import SearchConfig
+from p3i.search.result import Candidate, StopReason, SynthesisResult
+
+# What the search is to do with a photo of this grey level.
+FINDS, FINDS_NOTHING, HAS_A_BUG, IS_INTERRUPTED, IS_LATE = 200, 0, 40, 80, 120
+
+
+def lattice(step: float) -> Program:
+    inner = Draw(x=Affine(step, 0, -30), y=Affine(0, step, -30))
+    rows = For("j", Affine(), Affine(constant=4), inner)
+    return Program(CameraPose(-31.2, 8.4), For("i", Affine(), Affine(constant=5), rows))
+
+
+class Search:
+    """The stand-in for p3i.search.synthesize, which remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.configs: list[SearchConfig] = []
+        self.images: list = []
+
+    def synthesize(self, image, config, *, progress=None, trace=None) -> SynthesisResult:
+        self.configs.append(config)
+        self.images.append(image)
+        if progress is not None:
+            progress("proposing", 0.5)
+        if trace is not None:
+            trace({"stage": "proposal", "score": np.float32(0.5), "theta": np.zeros(2)})
+        level = round(float(image.pixels[0, 0, 0]) * 255)
+        if level == HAS_A_BUG:
+            raise ZeroDivisionError("division by zero")
+        if level == FINDS_NOTHING:
+            return SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.12, needed=0.35)
+        stop = {IS_INTERRUPTED: StopReason.INTERRUPTED, IS_LATE: StopReason.TIME_UP}.get(level)
+        found = [Candidate(program=lattice(s), score=s / 100, structure="lattice") for s in (12.0, 6.0, 3.0)]
+        return SynthesisResult(
+            program=found[0].program,
+            stop=stop or StopReason.FOUND,
+            structure="lattice",
+            score=0.87654321,
+            margin=0.21,
+            needed=0.35,
+            candidates=tuple(found[: config.top]),
+            centers=((10.123456, 20.0, 0, 0), (30.5, 20.25, 1, 0)),
+            focal_mm=config.focal_mm or 35.0,
+            focal_source="option" if config.focal_mm else "default",
+            features=config.features,
+            seed=config.seed,
+        )
+
+
+@pytest.fixture
+def search(monkeypatch: pytest.MonkeyPatch) -> Search:
+    stand_in = Search()
+    module = types.ModuleType("p3i.search.synthesize")
+    module.synthesize = stand_in.synthesize  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "p3i.search.synthesize", module)
+    return stand_in
+
+
+@pytest.fixture
+def photo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, search: Search) -> Callable[..., str]:
+    """Makes a photo of one grey level in the working folder, and returns its name."""
+    monkeypatch.chdir(tmp_path)
+
+    def make(name: str, level: int = FINDS) -> str:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(name, np.full((48, 64, 3), level, np.uint8))
+        return name
+
+    return make
+
+
+def test_the_program_of_a_photo_is_printed_with_its_header(photo, capsys) -> None:
+    assert run(["synth", photo("a.png")]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out == Path(__file__).with_name("golden").joinpath("synth.p3p").read_text()
+
+
+def test_the_printed_program_is_read_back_by_p3i(photo, capsys) -> None:
+    import p3i
+
+    run(["synth", photo("a.png")])
+    program = p3i.loads(capsys.readouterr().out)
+    assert program == p3i.loads(p3i.format(program))
+    assert program.header is not None and program.header.canvas == (64, 48)
+
+
+def test_jsonl_has_the_documented_keys_in_order(photo, capsys) -> None:
+    assert run(["synth", "--format", "jsonl", photo("a.png")]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert list(record) == [
+        "image", "width", "height", "program", "structure", "camera", "centers",
+        "score", "margin", "seconds", "features", "seed",
+    ]  # fmt: skip
+    assert (record["image"], record["width"], record["height"]) == ("a.png", 64, 48)
+    assert record["camera"] == {"rx": -31.2, "ry": 8.4, "focal": 35.0}
+    assert record["centers"] == [[10.12, 20.0, 0, 0], [30.5, 20.25, 1, 0]]
+    assert record["program"].startswith("# /// p3p\n")
+
+
+def test_a_photo_without_a_pattern_is_5_with_a_reason(photo, capsys) -> None:
+    assert run(["synth", photo("cat.png", FINDS_NOTHING)]) == 5
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == "error: cat.png: no regular pattern (best 0.12, needs 0.35)\n"
+
+
+def test_a_photo_without_a_pattern_is_a_line_of_jsonl(photo, capsys) -> None:
+    assert run(["synth", "--format", "jsonl", photo("cat.png", FINDS_NOTHING)]) == 5
+    record = json.loads(capsys.readouterr().out)
+    assert list(record) == ["image", "program", "error", "code", "seconds"]
+    assert record["program"] is None and record["code"] == 5
+    assert record["error"] == "no regular pattern (best 0.12, needs 0.35)"
+
+
+def test_a_batch_goes_on_after_each_kind_of_failure(photo, capsys) -> None:
+    names = [photo("a.png"), photo("b.png", FINDS_NOTHING), "missing.png", photo("c.png", HAS_A_BUG)]
+    names.append(photo("d.png"))
+    assert run(["synth", "--format", "jsonl", *names]) == 6
+    records = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [record["image"] for record in records] == names
+    assert [record.get("code", 0) for record in records] == [0, 5, 3, 70, 0]
+
+
+def test_a_batch_without_any_pattern_is_5(photo, capsys) -> None:
+    photo("b.png", FINDS_NOTHING)
+    photo("c.png", FINDS_NOTHING)
+    assert run(["synth", "--format", "jsonl", "*.png"]) == 5
+
+
+def test_a_bug_in_a_single_photo_is_70(photo, capsys) -> None:
+    assert run(["synth", photo("a.png", HAS_A_BUG)]) == 70
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_errors_as_json_name_their_photo(photo, capsys) -> None:
+    assert run(["synth", "--error-format", "json", photo("cat.png", FINDS_NOTHING)]) == 5
+    assert json.loads(capsys.readouterr().err) == {
+        "image": "cat.png",
+        "error": "no regular pattern (best 0.12, needs 0.35)",
+        "code": 5,
+    }
+
+
+def test_an_interrupt_prints_the_best_so_far_and_stops_the_batch(photo, search, capsys) -> None:
+    names = [photo("a.png"), photo("b.png", IS_INTERRUPTED), photo("c.png")]
+    assert run(["synth", "--format", "jsonl", *names]) == 130
+    captured = capsys.readouterr()
+    assert [json.loads(line)["image"] for line in captured.out.splitlines()] == ["a.png", "b.png"]
+    assert "interrupted" in captured.err and "best program so far" in captured.err
+
+
+def test_an_interrupt_that_escapes_the_search_is_130_too(photo, search, monkeypatch, capsys) -> None:
+    def interrupted(*_: object, **__: object) -> SynthesisResult:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["p3i.search.synthesize"], "synthesize", interrupted)
+    assert run(["synth", photo("a.png"), "-o", "a.p3p"]) == 130
+    assert not Path("a.p3p").exists()
+
+
+def test_an_interrupted_jsonl_file_keeps_the_lines_that_were_known(photo, capsys) -> None:
+    assert run(["synth", photo("a.png"), photo("b.png", IS_INTERRUPTED), "-o", "out.jsonl"]) == 130
+    assert len(Path("out.jsonl").read_text().splitlines()) == 2
+
+
+def test_the_end_of_the_time_is_an_answer_with_a_note(photo, capsys) -> None:
+    assert run(["synth", "--time", "1", photo("a.png", IS_LATE)]) == 0
+    assert "the time was up" in capsys.readouterr().err
+
+
+def test_o_writes_a_file_with_the_photo_relative_to_it(photo, capsys) -> None:
+    Path("out").mkdir()
+    assert run(["synth", photo("in/a.png"), "-o", "out/b.p3p"]) == 0
+    assert capsys.readouterr().out == ""
+    assert 'image = "../in/a.png"' in Path("out/b.p3p").read_text()
+
+
+def test_o_folder_holds_a_program_a_photo(photo) -> None:
+    photo("in/a.png")
+    photo("in/b.png", FINDS_NOTHING)
+    photo("in/c.png")
+    photo("in/c.jpg")
+    Path("in/notes.txt").write_text("no photo")
+    assert run(["synth", "in", "-o", "out/"]) == 6
+    assert sorted(path.name for path in Path("out").iterdir()) == ["a.p3p", "c.jpg.p3p", "c.png.p3p"]
+
+
+def test_nothing_is_overwritten_without_force(photo, search, capsys) -> None:
+    Path("a.p3p").write_text("mine")
+    assert run(["synth", photo("a.png"), "-o", "a.p3p"]) == 3
+    assert "--force" in capsys.readouterr().err
+    assert Path("a.p3p").read_text() == "mine"
+    assert search.configs == []  # refused before the search, not after it
+    assert run(["synth", "a.png", "-o", "a.p3p", "--force"]) == 0
+    assert Path("a.p3p").read_text() != "mine"
+
+
+@pytest.mark.parametrize("level", [FINDS_NOTHING, HAS_A_BUG])
+def test_a_failure_leaves_no_file_behind(level: int, photo) -> None:
+    assert run(["synth", photo("a.png", level), "-o", "a.p3p"]) != 0
+    assert sorted(path.name for path in Path().iterdir()) == ["a.png"]
+
+
+def test_an_output_that_cannot_be_written_is_3_before_the_search(photo, search, capsys) -> None:
+    assert run(["synth", photo("a.png"), "-o", "nowhere/a.p3p"]) == 3
+    assert "no folder nowhere" in capsys.readouterr().err
+    assert search.configs == []
+
+
+def test_top_lists_candidates(photo, capsys) -> None:
+    assert run(["synth", "--format", "jsonl", "--top", "2", photo("a.png")]) == 0
+    candidates = json.loads(capsys.readouterr().out)["candidates"]
+    assert [candidate["score"] for candidate in candidates] == [0.12, 0.06]
+    assert run(["synth", "--top", "2", "a.png", "-o", "out/"]) == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["a.2.p3p", "a.p3p"]
+
+
+def test_trace_writes_the_steps_of_each_photo(photo) -> None:
+    assert run(["synth", "--format", "jsonl", photo("a.png"), photo("b.png"), "--trace", "t.jsonl"]) == 0
+    steps = [json.loads(line) for line in Path("t.jsonl").read_text().splitlines()]
+    assert [step["image"] for step in steps] == ["a.png", "b.png"]
+    assert steps[0]["theta"] == [0.0, 0.0]
+
+
+def test_every_option_of_the_search_arrives_there(photo, search) -> None:
+    photo("a.png")
+    search_words = "--structure lattice --extent image --focal 28 --features rgb --strict --time 3.5"
+    words = shlex.split(f"{search_words} --top 2 --seed 7 --device cpu --threads 2 --format jsonl")
+    assert run(["synth", "a.png", *words]) == 0
+    assert search.configs == [
+        SearchConfig(
+            structure="lattice",
+            extent="image",
+            focal_mm=28.0,
+            features="rgb",
+            strict=True,
+            time_s=3.5,
+            top=2,
+            seed=7,
+            device="cpu",
+            threads=2,
+        )
+    ]
+
+
+def test_mask_and_roi_make_pixels_unknown(photo, search) -> None:
+    mask = np.zeros((48, 64), np.uint8)
+    mask[:, :10] = 255
+    cv2.imwrite(photo("mask.png"), mask)
+    assert run(["synth", photo("a.png"), "--mask", "mask.png", "--roi", "5,6,20,30"]) == 0
+    valid = search.images[0].valid
+    expected = np.zeros((48, 64), bool)
+    expected[6:36, 10:25] = True
+    assert np.array_equal(valid, expected)
+
+
+def test_a_polygon_is_a_region_of_interest(photo, search) -> None:
+    assert run(["synth", photo("a.png"), "--roi", "0,0 63,0 0,47"]) == 0
+    valid = search.images[0].valid
+    assert valid[1, 1] and not valid[46, 62]
+    assert 0.45 < valid.mean() < 0.55
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--roi", "1,2,3"],
+        ["--roi", "a,b,c,d"],
+        ["--roi", "0,0,nan,5"],
+        ["--roi", "1000,1000,5,5"],
+        ["--structure", "circular"],
+        ["--structure", "hybrid"],
+        ["--features", "sift"],
+        ["--features", "alexnet"],
+        ["--focal", "0"],
+        ["--time", "-1"],
+        ["--time", "nan"],
+        ["--top", "0"],
+        ["--top", "2"],
+        ["--threads", "0"],
+        ["--seed", "-1"],
+        ["--max-px", "0"],
+        ["--format", "jsonl", "-o", "."],
+        ["b.png"],
+    ],
+    ids=" ".join,
+)
+def test_wrong_usage_is_2_with_one_line(words: list[str], photo, capsys) -> None:
+    photo("a.png")
+    photo("b.png")
+    assert run(["synth", "a.png", *words]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("error: ") and captured.err.count("\n") == 1
+
+
+def test_structures_to_come_are_refused_by_name(photo, capsys) -> None:
+    run(["synth", photo("a.png"), "--structure", "circular"])
+    assert "not there yet" in capsys.readouterr().err
+
+
+def test_verbose_names_the_focal_and_where_it_came_from(photo, capsys) -> None:
+    assert run(["synth", "-v", photo("a.png")]) == 0
+    assert "focal 35 mm (default)" in capsys.readouterr().err
+    assert run(["synth", "-v", "--focal", "28", "a.png"]) == 0
+    assert "focal 28 mm (option)" in capsys.readouterr().err
+
+
+def test_equal_calls_print_equal_json_apart_from_the_seconds(photo, capsys) -> None:
+    photo("a.png")
+    printed = []
+    for _ in range(2):
+        run(["synth", "--format", "jsonl", "a.png"])
+        printed.append({**json.loads(capsys.readouterr().out), "seconds": None})
+    assert printed[0] == printed[1]
+
+
+def test_an_empty_folder_and_an_empty_glob_are_3(photo, capsys) -> None:
+    Path("empty").mkdir()
+    assert run(["synth", "empty"]) == 3
+    assert "holds no file of a known kind" in capsys.readouterr().err
+    assert run(["synth", "*.jpg"]) == 3
+    assert "no file matches *.jpg" in capsys.readouterr().err
