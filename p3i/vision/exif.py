@@ -17,6 +17,31 @@ PIXEL_HEIGHT = 0xA003
 ORIENTATION = 0x0112
 EXIF_BLOCK = 0x8769
 
+# Of a TIFF: sizes, depths, strips and tiles, compression, extra samples, tables, profile. They describe the old
+# file's pixels and would contradict the new one's.
+_STORAGE_TAGS = {
+    256,
+    257,
+    258,
+    259,
+    262,
+    273,
+    277,
+    278,
+    279,
+    284,
+    317,
+    320,
+    322,
+    323,
+    324,
+    325,
+    338,
+    339,
+    347,
+}
+_STORAGE_TAGS |= {530, 531, 532, 34675}
+
 # The diagonal of a 36 x 24 mm frame, to which the 35 mm-equivalent figure refers.
 FRAME_DIAGONAL_MM = 43.27
 # Millimetres in a FocalPlaneResolutionUnit: inch, centimetre, millimetre, micrometre.
@@ -78,9 +103,11 @@ def focal_from_exif(exif: Pil.Exif, size: Size) -> ExifFocal:
 
 
 def upright_exif(exif: bytes) -> bytes:
-    """The EXIF block of a picture that is written upright: the same, with orientation 1."""
+    """The EXIF block of a picture that is written upright: orientation 1, and nothing of how it was stored."""
     block = Pil.Exif()
     block.load(exif)
+    for tag in _STORAGE_TAGS & set(block):
+        del block[tag]
     block[ORIENTATION] = 1
     return block.tobytes()
 

@@ -1,0 +1,220 @@
+import io
+import os
+import stat
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image as Pil
+from PIL import ImageCms
+
+from p3i.errors import FileError, UsageError
+from p3i.vision.image import read_image, write_image
+from p3i.vision.write import encode, read_png_text, write_bytes
+
+
+@pytest.fixture
+def pixels() -> np.ndarray:
+    return np.random.default_rng(0).random((12, 17, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".bmp", ".PNG"])
+def test_what_is_written_is_read_again(tmp_path, pixels, suffix):
+    path = tmp_path / f"a{suffix}"
+    write_image(path, pixels)
+    np.testing.assert_allclose(read_image(path).pixels, pixels, atol=0.5 / 255 + 1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".webp"])
+def test_formats_with_loss_come_close(tmp_path, suffix):
+    y, x = np.mgrid[0:32, 0:48]
+    smooth = np.stack([x / 48, y / 32, np.full((32, 48), 0.3)], axis=-1)
+    write_image(tmp_path / f"a{suffix}", smooth)
+    np.testing.assert_allclose(read_image(tmp_path / f"a{suffix}").pixels, smooth, atol=0.06)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif"])
+@pytest.mark.parametrize("with_alpha", [False, True])
+def test_16_bits_alpha_and_profile_survive(tmp_path, pixels, suffix, with_alpha):
+    alpha = np.linspace(0, 1, 12 * 17, dtype=np.float32).reshape(12, 17) if with_alpha else None
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    path = tmp_path / f"a{suffix}"
+    write_image(path, pixels, alpha=alpha, bits=16, icc=profile)
+    image = read_image(path)
+    assert image.source.bits == 16
+    assert image.source.icc == profile
+    np.testing.assert_allclose(image.pixels, pixels, atol=1e-5)
+    if alpha is None:
+        assert image.source.alpha is None
+    else:
+        assert image.source.alpha is not None
+        np.testing.assert_allclose(image.source.alpha, alpha, atol=1e-5)
+    with Pil.open(path) as picture:
+        picture.load()  # another reader takes it too
+
+
+def test_exif_is_kept_and_says_upright(tmp_path, pixels):
+    exif = Pil.Exif()
+    exif[0x0112] = 6
+    exif[0x010F] = "Camera works"
+    for suffix in (".png", ".jpg", ".webp", ".tif"):
+        write_image(tmp_path / f"a{suffix}", pixels, exif=exif.tobytes())
+        with Pil.open(tmp_path / f"a{suffix}") as picture:
+            found = picture.getexif()
+        assert found[0x010F] == "Camera works", suffix
+        assert found.get(0x0112, 1) == 1, suffix
+        assert read_image(tmp_path / f"a{suffix}").size.width == 17
+
+
+def test_a_photo_goes_round_with_all_it_holds(tmp_path, pixels):
+    exif = Pil.Exif()
+    exif[0x0112] = 8
+    picture = Pil.fromarray((pixels * 255).astype(np.uint8))
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    picture.save(tmp_path / "a.png", exif=exif, icc_profile=profile)
+    first = read_image(tmp_path / "a.png")
+    source = first.source
+    write_image(tmp_path / "b.png", first.pixels, icc=source.icc, exif=source.exif, bits=source.bits)
+    second = read_image(tmp_path / "b.png")
+    np.testing.assert_array_equal(first.pixels, second.pixels)
+    assert second.source.icc == profile
+
+
+def test_a_tiff_gives_its_camera_but_not_its_strips_to_a_jpeg(tmp_path, pixels):
+    exif = Pil.Exif()
+    exif[0x010F] = "Camera works"
+    Pil.fromarray((pixels * 255).astype(np.uint8)).save(tmp_path / "a.tif", exif=exif.tobytes())
+    source = read_image(tmp_path / "a.tif").source
+    write_image(tmp_path / "b.jpg", pixels, exif=source.exif)
+    with Pil.open(tmp_path / "b.jpg") as picture:
+        assert dict(picture.getexif()) == {0x010F: "Camera works", 0x0112: 1}
+
+
+def test_text_is_kept_in_a_png(pixels):
+    text = {"p3i": "SetCameraPose(rx=-42, ry=-15)\nfor i …", "Comment": ""}
+    data = encode(pixels, kind=".png", text=text)
+    assert read_png_text(data) == text
+    assert Pil.open(io.BytesIO(data)).text == text  # pyright: ignore
+    assert read_png_text(b"no png") == {}
+
+
+def test_text_is_found_in_a_png_of_another_writer(tmp_path, pixels):
+    from PIL.PngImagePlugin import PngInfo
+
+    info = PngInfo()
+    info.add_text("p3i", "latin é")
+    Pil.fromarray((pixels * 255).astype(np.uint8)).save(tmp_path / "a.png", pnginfo=info)
+    assert read_png_text((tmp_path / "a.png").read_bytes()) == {"p3i": "latin é"}
+    assert read_png_text((tmp_path / "a.png").read_bytes()[:50]) is not None
+
+
+def test_values_beyond_the_range_are_clipped_and_nan_is_black(tmp_path):
+    write_image(tmp_path / "a.png", np.array([[[-1.0, 2.0, np.nan]]]))
+    np.testing.assert_array_equal(read_image(tmp_path / "a.png").pixels, [[[0, 1, 0]]])
+
+
+def test_bytes_are_written_as_they_are(tmp_path):
+    array = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+    write_image(tmp_path / "a.png", array)
+    with Pil.open(tmp_path / "a.png") as picture:
+        np.testing.assert_array_equal(np.asarray(picture), array)
+
+
+def test_nothing_is_overwritten_without_force(tmp_path, pixels):
+    path = tmp_path / "a.png"
+    path.write_text("mine")
+    with pytest.raises(FileError, match=r"a.png exists already.*--force"):
+        write_image(path, pixels)
+    assert path.read_text() == "mine"
+    write_image(path, pixels, force=True)
+    assert read_image(path).size.width == 17
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_appears_while_we_write_is_not_replaced(tmp_path, monkeypatch):
+    real_link = os.link
+
+    def someone_was_faster(source, target):
+        (tmp_path / "a.png").write_text("theirs")
+        real_link(source, target)
+
+    monkeypatch.setattr(os, "link", someone_was_faster)
+    with pytest.raises(FileError, match="exists already"):
+        write_bytes(tmp_path / "a.png", b"ours")
+    assert (tmp_path / "a.png").read_text() == "theirs"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_failure_leaves_neither_a_part_nor_a_loss(tmp_path, monkeypatch, force):
+    path = tmp_path / "a.png"
+    if force:
+        path.write_text("mine")
+
+    def full(handle, mode):
+        os.close(handle)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fdopen", full)
+    with pytest.raises(FileError, match=r"a\.png cannot be written: No space left on device"):
+        write_bytes(path, b"new", force=force)
+    assert [entry.name for entry in tmp_path.iterdir()] == (["a.png"] if force else [])
+    if force:
+        assert path.read_text() == "mine"
+
+
+def test_places_that_cannot_be_written_are_named(tmp_path, pixels):
+    with pytest.raises(FileError, match=r"no folder .*missing"):
+        write_image(tmp_path / "missing" / "a.png", pixels)
+    (tmp_path / "b.png").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        write_image(tmp_path / "b.png", pixels, force=True)
+
+
+def test_new_files_get_the_usual_permissions_and_old_ones_keep_theirs(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_bytes(tmp_path / "new", b"1")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == 0o640
+    (tmp_path / "new").chmod(0o600)
+    write_bytes(tmp_path / "new", b"2", force=True)
+    assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == 0o600
+
+
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "real").write_bytes(b"1")
+    (tmp_path / "link").symlink_to("real")
+    write_bytes(tmp_path / "link", b"2", force=True)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_bytes() == b"2"
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/null"), reason="no /dev/null here")
+def test_a_device_is_written_to_and_not_replaced():
+    write_bytes("/dev/null", b"gone")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+def test_standard_output_takes_a_picture(monkeypatch, pixels):
+    buffer = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(buffer))
+    write_image("-", pixels, kind=".png")
+    assert Pil.open(io.BytesIO(buffer.getvalue())).size == (17, 12)
+
+
+@pytest.mark.parametrize(
+    ("path", "options", "message"),
+    [
+        ("a.xyz", {}, r"'\.xyz'.*\.png"),
+        ("a", {}, "no suffix"),
+        ("a.jpg", {"alpha": np.ones((12, 17))}, "JPEG keeps no transparency"),
+        ("a.jpg", {"text": {"p3i": "x"}}, "JPEG keeps no text"),
+        ("a.png", {"bits": 12}, "8 or 16 bits, not 12"),
+    ],
+)
+def test_what_a_format_cannot_hold_is_refused(tmp_path, pixels, path, options, message):
+    with pytest.raises(UsageError, match=message):
+        write_image(tmp_path / path, pixels, **options)
+    assert list(tmp_path.iterdir()) == []
