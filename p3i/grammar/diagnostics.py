@@ -92,7 +92,10 @@ def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
 
 
 class ParseError(ProgramError):
-    """A text is not a program. `diagnostics` hold all that was found, `source` and `path` what was read."""
+    """A text is not a program, or its program cannot be walked.
+
+    `diagnostics` hold all that was found, `source` and `path` what was read; `report` quotes the text.
+    """
 
     def __init__(
         self, diagnostics: tuple[Diagnostic, ...], *, source: str = "", path: str = "<program>"
@@ -103,6 +106,15 @@ class ParseError(ProgramError):
         super().__init__(diagnostics, source, path)
 
     def __str__(self) -> str:
-        from p3i.grammar.report import report_human  # report.py reads this module
+        """The first error in one line, and how many more there are."""
+        from p3i.grammar.report import one_line  # report.py reads this module
 
-        return report_human(self.diagnostics, source=self.source, path=self.path).rstrip("\n")
+        return one_line(self.diagnostics, source=self.source, path=self.path)
+
+    def report(self, *, as_json: bool = False, color: bool = False) -> str:
+        """All findings as `p3i check` prints them, lines included."""
+        from p3i.grammar.report import report_human, report_json
+
+        if as_json:
+            return report_json(self.diagnostics, source=self.source, path=self.path)
+        return report_human(self.diagnostics, source=self.source, path=self.path, color=color)

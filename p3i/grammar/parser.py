@@ -14,7 +14,7 @@ from p3i.grammar.ast import Program
 from p3i.grammar.diagnostics import Diagnostic, error, in_order
 from p3i.grammar.header import HeaderReading, read_header
 from p3i.grammar.heads import HeadReader, span_of
-from p3i.grammar.layout import Words, decode, lay_out, too_deep, words
+from p3i.grammar.layout import Words, decode, lay_out, source_text, too_deep, words
 from p3i.grammar.normal import Blank
 from p3i.grammar.recovery import HEAD_RULES, explain_structure, read_heads
 from p3i.grammar.tree import Tree, plant
@@ -51,7 +51,7 @@ def parse(source: str | bytes, *, strict: bool = False) -> Program | tuple[Diagn
     if strict:
         from p3i.grammar.strict import strict_problems  # its grammar is built on demand
 
-        problems = strict_problems(source, parsed.program)
+        problems = strict_problems(source_text(source), parsed.program)
         if problems:
             return problems
     return parsed.program

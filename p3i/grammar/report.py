@@ -7,7 +7,7 @@ terminal: control characters are shown as `\N{REPLACEMENT CHARACTER}`, one colum
 import json
 import unicodedata
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from p3i.grammar.ast import Span
 from p3i.grammar.diagnostics import Diagnostic
@@ -51,6 +51,17 @@ def report_json(diagnostics: Iterable[Diagnostic], *, source: str, path: str = "
         }
         lines.append(json.dumps(record) + "\n")
     return "".join(lines)
+
+
+def one_line(diagnostics: Sequence[Diagnostic], *, source: str, path: str) -> str:
+    """The first error (or finding) in one line with its place, and how many more there are."""
+    first = next((found for found in diagnostics if found.severity == "error"), None) or diagnostics[0]
+    place = path
+    if first.span is not None and source:
+        line, column = line_and_column(first.span.start, line_starts(source))
+        place = f"{path}:{line}:{column}"
+    more = f" (and {len(diagnostics) - 1} more)" if len(diagnostics) > 1 else ""
+    return printable(f"{place}: {first.severity}[{first.code}]: {first.message}{more}")
 
 
 def line_starts(source: str) -> list[int]:

@@ -1,14 +1,224 @@
-"""Strict mode (thin for now)."""
+"""Strict mode: Table 1 to the letter (table1.lark), and where and how a program leaves it."""
 
-from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import Diagnostic
+from collections.abc import Iterator
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from lark import Lark, Token, Transformer, UnexpectedInput, UnexpectedToken
+
+from p3i.grammar.ast import Affine, CameraPose, Coordinate, Draw, For, If, Polar, Program, Span, Variable
+from p3i.grammar.diagnostics import Diagnostic, error, in_order
+from p3i.grammar.leaves import statements
+
+PRODUCTIONS = {
+    "Program": "Program -> CameraProgram; WorldProgram",
+    "CameraProgram": "CameraProgram -> SetCameraPose(rx=Real, ry=Real)",
+    "WorldProgram": "WorldProgram -> For1Stmt | Rotate2Stmt",
+    "For1Stmt": "For1Stmt -> For (i in range(Integer, Integer)) { For2Stmt | Rotate2Stmt }",
+    "For2Stmt": "For2Stmt -> For (j in range(Integer, Integer)) { CondDrawStmt }",
+    "Rotate2Stmt": "Rotate2Stmt -> For (j in range(ExprI, ExprI)) { RotateDrawStmt }",
+    "CondDrawStmt": "CondDrawStmt -> If (Expr >= 0) { CondDrawStmt } | DrawStmt",
+    "DrawStmt": "DrawStmt -> Draw(x=Expr, y=Expr)",
+    "RotateDrawStmt": "RotateDrawStmt -> Draw(x=RExprX, y=RExprY)",
+    "Expr": "Expr -> Real * i + Real * j",
+    "ExprI": "ExprI -> Real * i",
+    "RExprX": "RExprX -> Real * Cos(Real * j) * i + Real | Real * Cos(Real * j) + Real",
+    "RExprY": "RExprY -> Real * Sin(Real * j) * i + Real | Real * Sin(Real * j) + Real",
+}
+"""Table 1, as messages quote it."""
 
 
-def strict_problems(source: str | bytes, program: Program) -> tuple[Diagnostic, ...]:
-    """Placeholder."""
-    return ()
+def strict_problems(text: str, program: Program) -> tuple[Diagnostic, ...]:
+    """Why `text`, which spells `program` in the superset, is no string of Table 1; empty where it is one.
+
+    Where the program itself leaves the table, every such place is named (P301); else the first word that is
+    not spelt as the table spells it (P302).
+    """
+    outcome = read_table1(text)
+    if isinstance(outcome, Program):
+        return ()
+    return departures(program) or (_misspelt(outcome, text, program),)
+
+
+def read_table1(text: str) -> Program | UnexpectedInput:
+    """The program that `text` spells by table1.lark alone, without spans and comments, or what stopped it.
+
+    Raises ValueError for a numeral beyond the range of a double, which the superset's reader refuses first.
+    """
+    try:
+        return _table1().parse(text)  # pyright: ignore[reportReturnType]  # the reader makes a Program of `program`
+    except UnexpectedInput as problem:
+        return problem
 
 
 def departures(program: Program) -> tuple[Diagnostic, ...]:
-    """Placeholder."""
-    return ()
+    """Every place where the program, however spelt, lies outside Table 1, with the production that it leaves."""
+    return in_order(_departures(program))
+
+
+def _departures(program: Program) -> Iterator[Diagnostic]:
+    chain = [statement for _, statement in statements(program)]
+    loops = [statement for statement in chain if isinstance(statement, For)]
+    guards = [statement for statement in chain if isinstance(statement, If)]
+    draw = chain[-1]
+    assert isinstance(draw, Draw)
+    ring = isinstance(draw.x, Polar) or isinstance(draw.y, Polar)
+    variables = [loop.variable for loop in loops]
+    if variables != ["i", "j"] and not (ring and variables == ["j"]):
+        help = "Table 1 has two loops, `For (i ...)` around `For (j ...)`, or one `For (j ...)` around a ring"
+        yield _leaves("WorldProgram", (loops[0] if loops else draw).span, help=help)
+    for loop in loops:
+        for bound in (loop.start, loop.stop):
+            if loop.variable == "j" and ring:
+                if bound.constant != 0 or bound.j != 0:
+                    yield _leaves("Rotate2Stmt", bound.span, help="write the bounds of a ring as `6 * i`")
+            elif (bound.i, bound.j) != (0, 0) or bound.constant != int(bound.constant):
+                production = "For1Stmt" if loop.variable == "i" else "For2Stmt"
+                yield _leaves(production, bound.span, help="write a whole number")
+    for statement in guards:
+        if ring:
+            yield _leaves("Rotate2Stmt", statement.span, help="a ring of Table 1 has no `If`")
+        elif statement.guard.constant != 0:
+            help = "a guard of Table 1 has no constant: shift the ranges so that it becomes 0"
+            yield _leaves("CondDrawStmt", statement.guard.span, help=help)
+    if draw.picture is not None:
+        yield _leaves("DrawStmt", draw.span, help="leave the picture out")
+    for name, coordinate in (("x", draw.x), ("y", draw.y)):
+        yield from _coordinate_departures(name, coordinate, ring=ring)
+
+
+def _coordinate_departures(name: str, coordinate: Coordinate, *, ring: bool) -> Iterator[Diagnostic]:
+    if isinstance(coordinate, Affine):
+        if ring:
+            yield _leaves(f"RExpr{name.upper()}", coordinate.span, help="a ring has Cos in x and Sin in y")
+        elif coordinate.constant != 0:
+            yield _leaves("Expr", coordinate.span, help="a coordinate of Table 1 has no constant")
+        return
+    production = f"RExpr{name.upper()}"
+    radius, angle, offset = coordinate.radius, coordinate.angle, coordinate.offset
+    if coordinate.function != {"x": "Cos", "y": "Sin"}[name]:
+        yield _leaves(production, coordinate.span, help="a ring has Cos in x and Sin in y")
+    if radius.j != 0 or (radius.i != 0 and radius.constant != 0):
+        yield _leaves(production, radius.span, help="the radius is `Real` or `Real * i`, not a sum")
+    if angle.i != 0 or angle.constant != 0:
+        yield _leaves(production, angle.span, help="the angle is `Real * j`")
+    if offset.i != 0 or offset.j != 0:
+        yield _leaves(production, offset.span, help="the middle of a ring is one number")
+
+
+def _leaves(production: str, span: Span | None, *, help: str) -> Diagnostic:
+    message = f"this leaves Table 1 at `{production}`: `{PRODUCTIONS[production]}`"
+    return error("P301", message, span, label=f"not a `{production}`", help=help)
+
+
+def _misspelt(problem: UnexpectedInput, text: str, program: Program) -> Diagnostic:
+    """The first word that Table 1 spells otherwise."""
+    offset = min(problem.pos_in_stream or 0, len(text))
+    end = offset + 1
+    if isinstance(problem, UnexpectedToken) and problem.token.type == "$END":
+        offset, end = len(text.rstrip()), len(text.rstrip()) + 1
+    elif isinstance(problem, UnexpectedToken):
+        end = offset + len(problem.token)
+    production = _production_at(program, offset)
+    message = f"this is not spelt as in Table 1: `{PRODUCTIONS[production]}`"
+    help = "`p3i fmt --layout table1` writes it so"
+    return error("P302", message, Span(offset, end), label=f"in `{production}`", help=help)
+
+
+def _production_at(program: Program, offset: int) -> str:
+    """The production whose text holds the offset."""
+
+    def holds(span: Span | None) -> bool:
+        return span is not None and span.start <= offset < span.end
+
+    ring = False
+    for _, statement in statements(program):
+        ring = isinstance(statement, Draw) and isinstance(statement.x, Polar)
+    if holds(program.camera.span):
+        return "CameraProgram"
+    for _, statement in statements(program):
+        match statement:
+            case For(variable=variable) if holds(statement.span):
+                return "For1Stmt" if variable == "i" else "Rotate2Stmt" if ring else "For2Stmt"
+            case If(guard=guard) if holds(statement.span):
+                return (
+                    "Expr"
+                    if holds(guard.span) and offset < (guard.span or Span(0, 0)).end - 1
+                    else "CondDrawStmt"
+                )
+            case Draw(x=x, y=y) if holds(statement.span):
+                if holds(x.span):
+                    return "RExprX" if ring else "Expr"
+                if holds(y.span):
+                    return "RExprY" if ring else "Expr"
+                return "RotateDrawStmt" if ring else "DrawStmt"
+            case _:
+                pass
+    return "Program"
+
+
+class _TableReader(Transformer[Token, Any]):
+    """The callbacks of table1.lark's rules: a second reader, apart from the superset's."""
+
+    def program(self, children: list[Any]) -> Program:
+        camera, world = children
+        return Program(camera, world)
+
+    def camera_program(self, children: list[Any]) -> CameraPose:
+        _, _, rx, _, ry = children
+        return CameraPose(rx, ry)
+
+    def for1_stmt(self, children: list[Any]) -> For:
+        return self._loop("i", children)
+
+    def for2_stmt(self, children: list[Any]) -> For:
+        return self._loop("j", children)
+
+    def rotate2_stmt(self, children: list[Any]) -> For:
+        return self._loop("j", children)
+
+    def _loop(self, variable: Variable, children: list[Any]) -> For:
+        *_, start, stop, body = children
+        bounds = (bound if isinstance(bound, Affine) else Affine(constant=bound) for bound in (start, stop))
+        return For(variable, *bounds, body)
+
+    def cond_stmt(self, children: list[Any]) -> If:
+        _, guard, _, _, body = children
+        return If(guard, body)
+
+    def draw_stmt(self, children: list[Any]) -> Draw:
+        _, _, x, _, y = children
+        return Draw(x, y)
+
+    rotate_draw_stmt = draw_stmt
+
+    def expr(self, children: list[Any]) -> Affine:
+        i, _, j, _ = children
+        return Affine(i, j)
+
+    def expr_i(self, children: list[Any]) -> Affine:
+        return Affine(children[0])
+
+    def rexpr_x(self, children: list[Any]) -> Polar:
+        return self._ring("Cos", children)
+
+    def rexpr_y(self, children: list[Any]) -> Polar:
+        return self._ring("Sin", children)
+
+    def _ring(self, function: Any, children: list[Any]) -> Polar:
+        radius, _, step, _, *grown, offset = children
+        swell = Affine(i=radius) if grown else Affine(constant=radius)
+        return Polar(function, swell, Affine(j=step), Affine(constant=offset))
+
+    def real(self, children: list[Token]) -> float:
+        return float(children[0])
+
+    integer = real
+
+
+@cache
+def _table1() -> Lark:
+    """The reader of table1.lark, built once a process and only in strict mode."""
+    grammar = files("p3i.grammar").joinpath("table1.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", start="program", transformer=_TableReader())
