@@ -1,0 +1,136 @@
+"""All shifts at once: how alike a view and its shifted copy are, by FFT, and the lattice in the peaks.
+
+Convention: a view is float32 [H, W, C] with weights [H, W] in 0..1 (0 = unknown), shifts are (x, y) in pixels
+of the view. OpenCV's transforms are used on packed real spectra: they were the fastest at these sizes.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+# Shifts at which less than this share of the view (or of its energy) overlaps itself are not judged.
+_LEAST_OVERLAP = 0.15
+# A peak lower than this is not worth a look.
+_LEAST_PEAK = 0.02
+# Peaks are paired among this many of the best.
+_PEAKS = 14
+# Two shifts closer to parallel than this (sine of the angle) do not span a lattice.
+_LEAST_SINE = 0.35
+# The smallest cell among the pairs within this share of the best pair wins.
+_NEARLY_BEST = 0.8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Autocorrelation:
+    """`values` [S, S] float32, zero shift in the middle, -1 where too little overlaps; `judged` [S, S]."""
+
+    values: np.ndarray
+    judged: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShiftPair:
+    """Two shifts that span a lattice: `basis` [2, 2] rows in view pixels, `worth` the valley contrast."""
+
+    basis: np.ndarray
+    worth: float
+
+
+def autocorrelation(view: np.ndarray, weights: np.ndarray) -> Autocorrelation:
+    """2 sum w w' F.F' / sum w w' (|F|^2 + |F'|^2) over all shifts up to half the view.
+
+    w is the weight of a pixel, F its features, primes the shifted copy (DESIGN.md, 4.2).
+    """
+    side = cv2.getOptimalDFTSize(int(1.5 * max(weights.shape)))
+    weighted = view * weights[:, :, None]
+    energy = np.einsum("hwc,hwc->hw", view, view)
+
+    def spectrum(plane: np.ndarray) -> np.ndarray:
+        padded = np.zeros((side, side), np.float32)
+        padded[: plane.shape[0], : plane.shape[1]] = plane
+        return cv2.dft(padded, nonzeroRows=plane.shape[0])
+
+    def correlation(product: np.ndarray) -> np.ndarray:
+        return cv2.idft(product, flags=cv2.DFT_SCALE | cv2.DFT_REAL_OUTPUT)
+
+    power = np.zeros((side, side), np.float32)
+    for channel in range(view.shape[2]):
+        one = spectrum(np.ascontiguousarray(weighted[:, :, channel]))
+        power += cv2.mulSpectrums(one, one, 0, conjB=True)
+    of_weights = spectrum(weights)
+    of_energy = spectrum(weights * energy)
+    inner = correlation(power)
+    crossed = correlation(cv2.mulSpectrums(of_energy, of_weights, 0, conjB=True))
+    # The mean of |F|^2 and |F'|^2: the crossed term and its mirror image.
+    mirrored = np.roll(crossed[::-1, ::-1], (1, 1), (0, 1))
+    norm = 0.5 * (crossed + mirrored)
+    overlap = correlation(cv2.mulSpectrums(of_weights, of_weights, 0, conjB=True))
+    judged = (overlap > _LEAST_OVERLAP * overlap[0, 0]) & (norm > _LEAST_OVERLAP * norm[0, 0])
+    values = np.where(judged, inner / np.maximum(norm, 1e-6 * max(float(norm[0, 0]), 1e-9)), -1)
+    return Autocorrelation(
+        np.fft.fftshift(values).astype(np.float32), np.fft.fftshift(judged)
+    )
+
+
+def best_pair(found: Autocorrelation, *, least: float, most: float) -> ShiftPair | None:
+    """The two shifts between `least` and `most` pixels that best span a lattice, None where there is none.
+
+    A shift's worth is its valley contrast: its value less the least on the way from zero. A pair needs its
+    sum and difference too; among those nearly as good as the best, the smallest cell is taken.
+    """
+    shifts, worth = _peaks(found, least=least, most=most)
+    if len(shifts) < 2:
+        return None
+    first, second = np.triu_indices(len(shifts), 1)
+    u, v = shifts[first], shifts[second]
+    area = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    wide = area > _LEAST_SINE * np.hypot(*u.T) * np.hypot(*v.T)
+    if not wide.any():
+        return None
+    first, second, u, v, area = first[wide], second[wide], u[wide], v[wide], area[wide]
+    diagonals = np.stack([valley_contrast(found, u + v), valley_contrast(found, u - v)])
+    score = 0.6 * np.minimum(worth[first], worth[second]) + 0.4 * diagonals.clip(0).mean(0)
+    nearly = np.flatnonzero(score >= _NEARLY_BEST * score.max())
+    best = nearly[np.argmin(area[nearly])]
+    return ShiftPair(np.stack([u[best], v[best]]), float(score[best]))
+
+
+def valley_contrast(found: Autocorrelation, shifts: np.ndarray) -> np.ndarray:
+    """The value at each shift [N, 2] less the least value on the straight way to it from zero, [N]."""
+    middle = found.values.shape[0] // 2
+    way = np.linspace(0, 1, 21)[None, :]
+    x = (middle + shifts[:, :1] * way).astype(np.float32)
+    y = (middle + shifts[:, 1:] * way).astype(np.float32)
+    on_the_way = cv2.remap(
+        found.values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=-1
+    )
+    return on_the_way[:, -1] - on_the_way.min(1)
+
+
+def _peaks(found: Autocorrelation, *, least: float, most: float) -> tuple[np.ndarray, np.ndarray]:
+    """The local maxima of one half plane (the other mirrors it): shifts [N, 2] and their worth, best first."""
+    values = found.values
+    middle = values.shape[0] // 2
+    high = cv2.dilate(values, np.ones((5, 5), np.uint8))
+    y, x = np.nonzero((values >= high) & found.judged & (values > _LEAST_PEAK))
+    inside = (x > 0) & (y > 0) & (x < values.shape[1] - 1) & (y < values.shape[0] - 1)
+    dx, dy = x - middle, y - middle
+    far = np.hypot(dx, dy)
+    kept = inside & (far >= least) & (far <= most) & ((dy > 0) | ((dy == 0) & (dx > 0)))
+    x, y, dx, dy = x[kept], y[kept], dx[kept], dy[kept]
+    if len(x) == 0:
+        return np.zeros((0, 2)), np.zeros(0)
+    peak = values[y, x]
+    fine_x = _vertex(values[y, x - 1], peak, values[y, x + 1])
+    fine_y = _vertex(values[y - 1, x], peak, values[y + 1, x])
+    worth = valley_contrast(found, np.stack([dx, dy], 1).astype(float))
+    best = np.argsort(-worth, kind="stable")[:_PEAKS]
+    return np.stack([dx + fine_x, dy + fine_y], 1)[best], worth[best]
+
+
+def _vertex(before: np.ndarray, at: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Where the parabola through three neighbours has its top, in (-1/2, 1/2) of a pixel."""
+    bend = before - 2 * at + after
+    flat = np.abs(bend) < 1e-9
+    return np.where(flat, 0, 0.5 * (before - after) / np.where(flat, 1, bend)).clip(-0.5, 0.5)

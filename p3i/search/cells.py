@@ -1,0 +1,117 @@
+"""Cells: the stretch of plane around each draw, read off the feature map and compared.
+
+A cell is what fractional loop indices sweep: the points of (i + a, j + b) with a, b in [-1/2, 1/2). Under a
+lattice that is the fundamental cell, under concentric rings a sector of a ring, and so for any program. The
+neighbours of equation 2 are whole steps of the index; half steps of it are where the pattern must NOT look
+the same, else the cell is a multiple of the true one, or there is no pattern but a smooth picture.
+
+Convention: N cells, K samples a cell, C channels; `index` float64 [N, 2]; values [N, K, C], known [N, K].
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from p3i.interp.camera import project
+from p3i.interp.pattern import Pattern
+from p3i.search.evidence import Level
+from p3i.vision.warp import sample, sample_valid
+
+HALF_STEPS = torch.tensor([[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], dtype=torch.float64)
+"""The half steps of a two-directional index."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """The features of N cells at K samples each: values [N, K, C], known [N, K] bool."""
+
+    values: Tensor
+    known: Tensor
+
+
+def sample_grid(side: int) -> Tensor:
+    """`side` x `side` offsets (a, b) that sweep a cell evenly, [side * side, 2] within (-1/2, 1/2)."""
+    steps = (torch.arange(side, dtype=torch.float64) + 0.5) / side - 0.5
+    return torch.cartesian_prod(steps, steps)
+
+
+def sample_points(level: Level, pattern: Pattern, theta: Tensor, at: Tensor) -> tuple[Tensor, Tensor]:
+    """Where fractional indices [M, 2] lie on the map: ([M, 2] map pixels, [M] in front of the camera)."""
+    return project(level.map_from_plane(pattern, theta), pattern.points_at(at, theta))
+
+
+def read_cells(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, grid: Tensor) -> Cells:
+    """The features of the cells around `index` [N, 2], at the offsets `grid` [K, 2]."""
+    at = (index[:, None, :] + grid[None]).reshape(-1, 2)
+    points, in_front = sample_points(level, pattern, theta, at)
+    points = points.float()
+    known = sample_valid(level.valid, points) & in_front
+    values = sample(level.values, points) * known[:, None]
+    shape = (len(index), len(grid))
+    return Cells(values.reshape(*shape, -1), known.reshape(shape))
+
+
+def agreement(a: Tensor, b: Tensor, known: Tensor) -> Tensor:
+    """2 <a, b> / (|a|^2 + |b|^2) over the known samples: 1 equal, 0 unrelated; [..., K, C] -> [...].
+
+    Unlike a correlation it falls, too, where one of the two is much fainter.
+    """
+    mask = known[..., None]
+    inner = (a * b * mask).sum((-2, -1))
+    energy = ((a * a + b * b) * mask).sum((-2, -1))
+    return 2 * inner / energy.clamp(min=1e-6)
+
+
+def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
+    """The weighted mean of the cells [K, C] and the weight [K] that each sample of it rests on."""
+    weight = cells.known * weights[:, None].to(cells.values)
+    total = weight.sum(0)
+    return torch.einsum("nk,nkc->kc", weight, cells.values) / total.clamp(min=1e-6)[:, None], total
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contrast:
+    """How well each cell is predicted by the others, [N] each.
+
+    `agreement`: with the mean of all other cells. `contrast`: the same less the best that the mean reaches
+    half a step away; what a pattern has and a smooth or striped picture has not.
+    """
+
+    agreement: Tensor
+    contrast: Tensor
+
+
+def contrast(
+    level: Level,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    *,
+    weights: Tensor,
+    grid: Tensor,
+    half_steps: Tensor = HALF_STEPS,
+    rounds: int = 2,
+) -> Contrast:
+    """Predict each cell from all others. `weights` [N] start the mean; then the contrast itself weighs."""
+    cells = read_cells(level, pattern, theta, index, grid)
+    shifted = [
+        [read_cells(level, pattern, theta, index + sign * step, grid) for sign in (1, -1)]
+        for step in half_steps
+    ]
+    found = Contrast(torch.zeros(len(index)), torch.zeros(len(index)))
+    weights = weights.float()
+    for _ in range(rounds):
+        mean, total = mean_cell(cells, weights)
+        own = cells.known * weights[:, None]
+        rest = (total[None] - own).clamp(min=1e-6)[..., None]
+        others = (mean[None] * total[None, :, None] - own[..., None] * cells.values) / rest
+        whole = agreement(cells.values, others, cells.known)
+        half = torch.stack(
+            [sum(agreement(c.values, mean[None], c.known) for c in pair) / len(pair) for pair in shifted]
+        )
+        found = Contrast(whole, whole - half.amax(0).clamp(min=0))
+        weights = found.contrast.clamp(min=0)
+        if float(weights.sum()) <= 0:
+            break
+    return found

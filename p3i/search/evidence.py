@@ -1,0 +1,121 @@
+"""What the search looks at: a photo's features at several sizes and blurs, made when first asked for."""
+
+import math
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+
+from p3i.interp.pattern import Pattern
+from p3i.search.config import SearchConfig
+from p3i.size import Size
+from p3i.vision.features import FeatureMap, extract
+from p3i.vision.image import Image
+
+COARSE = 320
+"""Longer side, in pixels, of the map on which patterns with large cells are found."""
+FINE = 640
+"""Longer side of the map for small cells and for the last refinement."""
+
+# A cell is compared through a blur of this share of its side: wider than what its samples lie apart, so that
+# gradients of the samples say where the next sample goes, narrow enough to keep the cell's own drawing.
+_BLUR_SHARE = 0.1
+# Cells narrower than this on the coarse map are looked at on the fine one.
+_LEAST_COARSE_CELL = 24.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Level:
+    """A blurred feature map and its derivatives.
+
+    Convention: `stack` float32 [3C, H, W] holds the C channels, then their x and their y derivatives per
+    map pixel; `valid` bool [H, W]; `map_from_photo` float64 [3, 3] takes photo pixels to map pixels.
+    """
+
+    stack: Tensor
+    valid: Tensor
+    map_from_photo: Tensor
+    photo_size: Size
+    focal_mm: float
+
+    @property
+    def channels(self) -> int:
+        """C, the number of feature channels."""
+        return self.stack.shape[0] // 3
+
+    @property
+    def values(self) -> Tensor:
+        """The features alone, [C, H, W]."""
+        return self.stack[: self.channels]
+
+    @property
+    def size(self) -> Size:
+        """Width and height of the map."""
+        return Size(self.valid.shape[1], self.valid.shape[0])
+
+    @property
+    def unit_px(self) -> float:
+        """Map pixels in one program unit, where the plane is seen straight on."""
+        return self.photo_size.unit_px * float(self.map_from_photo[0, 0])
+
+    def map_from_plane(self, pattern: Pattern, theta: Tensor) -> Tensor:
+        """The homography from program units to map pixels, [..., 3, 3], differentiable in theta."""
+        seen = pattern.image_from_plane(theta, size=self.photo_size, focal_mm=self.focal_mm)
+        return self.map_from_photo @ seen
+
+
+@dataclass(slots=True)
+class Evidence:
+    """A photo as the search sees it. Holds the maps that were made so far, nothing else changes."""
+
+    image: Image
+    config: SearchConfig
+    focal_mm: float
+    _maps: dict[int, FeatureMap] = field(default_factory=dict)
+    _levels: dict[tuple[int, float], Level] = field(default_factory=dict)
+
+    def features(self, longer: int) -> FeatureMap:
+        """The photo's features with the longer side reduced to `longer` pixels (never enlarged)."""
+        longer = min(longer, self.image.size.longer)
+        if longer not in self._maps:
+            self._maps[longer] = extract(
+                self.image, name=self.config.features, longer=longer, weights=self.config.weights
+            )
+        return self._maps[longer]
+
+    def level(self, longer: int, *, blur: float) -> Level:
+        """The map of that size, blurred by a Gaussian of `blur` map pixels, with its derivatives."""
+        # Steps of a factor 2^(1/2) in blur: finer ones would only cost memory.
+        step = round(2 * math.log2(max(blur, 0.5))) / 2
+        longer = min(longer, self.image.size.longer)
+        if (longer, step) not in self._levels:
+            self._levels[longer, step] = _level(self, self.features(longer), 2.0**step)
+        return self._levels[longer, step]
+
+    def level_for(self, cell_px: float, *, finest: bool = False) -> Level:
+        """The map on which cells of `cell_px` photo pixels a side are compared best."""
+        scale = min(1.0, COARSE / self.image.size.longer)
+        longer = FINE if finest or cell_px * scale < _LEAST_COARSE_CELL else COARSE
+        cell = cell_px * min(1.0, longer / self.image.size.longer)
+        return self.level(longer, blur=_BLUR_SHARE * cell)
+
+
+def _level(evidence: Evidence, features: FeatureMap, blur: float) -> Level:
+    planes = features.values.numpy()
+    count = len(planes)
+    stack = np.empty((3 * count, *planes.shape[1:]), np.float32)
+    for channel, plane in enumerate(planes):
+        if blur > 0.6:  # the features themselves are blurred by a pixel already
+            plane = cv2.GaussianBlur(plane, (0, 0), blur, borderType=cv2.BORDER_REPLICATE)
+        stack[channel] = plane
+        stack[count + channel] = cv2.Sobel(plane, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8)
+        stack[2 * count + channel] = cv2.Sobel(plane, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8)
+    return Level(
+        torch.from_numpy(stack),
+        features.valid,
+        features.map_from_photo,
+        evidence.image.size,
+        evidence.focal_mm,
+    )

@@ -1,0 +1,131 @@
+"""Refinement: Gauss-Newton on the difference of all cells from their mean.
+
+Equation 2 compares neighbours only. Here every cell is compared with the mean of all, which is the same as
+comparing all pairs: the pairs that lie far apart are what makes the pose precise. The derivatives of where
+each sample falls come from the compiled generator (torch.func), so any sketch refines the same way.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from p3i.interp.pattern import Pattern
+from p3i.search.cells import sample_grid, sample_points
+from p3i.search.evidence import Level
+from p3i.vision.warp import sample, sample_valid
+
+# One step moves the camera by at most this many degrees, ...
+_MOST_TURN_DEG = 4.0
+# ... and any other number by at most this share of the pattern's step.
+_MOST_CHANGE = 0.08
+# A step this small against those limits ends the refinement.
+_CONVERGED = 2e-3
+# Levenberg damping, relative to the diagonal.
+_DAMPING = 1e-3
+# Residuals beyond twice their median count less and less (a Cauchy weight).
+_ROBUST_SCALE = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class FreeNumbers:
+    """Which numbers of theta a refinement may move: their places, and the scale of each one's step."""
+
+    places: tuple[int, ...]
+    limits: tuple[float, ...]
+
+
+def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> FreeNumbers:
+    """All numbers but the fixed ones, each with the most that one step may move it.
+
+    Zeros that scale a loop variable are free too: the limit comes from the largest number of their kind.
+    """
+    places, limits = [], []
+    values = dict(zip(pattern.paths, theta.tolist(), strict=True))
+    for place, path in enumerate(pattern.paths):
+        if path in fixed:
+            continue
+        if path.startswith("camera."):
+            limit = _MOST_TURN_DEG
+        else:
+            variable = path.rsplit(".", 1)[1]
+            kin = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] == variable]
+            limit = _MOST_CHANGE * max(*kin, 1e-3) if len(kin) > 1 else _MOST_CHANGE * max(kin[0], 1e-3)
+        places.append(place)
+        limits.append(limit)
+    return FreeNumbers(tuple(places), tuple(limits))
+
+
+def refine(
+    level: Level,
+    pattern: Pattern,
+    theta: Tensor,
+    *,
+    index: Tensor,
+    weights: Tensor,
+    fixed: frozenset[str],
+    samples: int = 6,
+    iterations: int = 4,
+) -> Tensor:
+    """Move theta [P] so that the cells around `index` [N, 2] look alike; returns the new theta.
+
+    `weights` [N] say how much each cell counts. `fixed` names the numbers that stay: those that shift all
+    cells alike (the phase) must, since looking alike does not fix them.
+    """
+    grid = sample_grid(samples)
+    at = (index[:, None, :] + grid[None]).reshape(-1, 2)
+    free = free_numbers(pattern, theta, fixed=fixed)
+    places, limits = torch.tensor(free.places), torch.tensor(free.limits, dtype=torch.float64)
+    shape = (len(index), len(grid))
+
+    def points_of(moving: Tensor, base: Tensor) -> tuple[Tensor, Tensor]:
+        points, in_front = sample_points(level, pattern, base.index_put((places,), moving), at)
+        return points, torch.cat([points, in_front[:, None].to(points)], dim=1).detach()
+
+    for _ in range(iterations):
+        jacobian, seen = torch.func.jacfwd(points_of, has_aux=True)(theta[places], theta)
+        points = seen[:, :2].float()
+        known = (sample_valid(level.valid, points) & (seen[:, 2] > 0)).reshape(shape)
+        read = sample(level.stack, points).reshape(*shape, 3, level.channels)
+        step = _step(
+            read[:, :, 0],
+            read[:, :, 1:],
+            jacobian.float().reshape(*shape, 2, len(places)),
+            known * weights[:, None].float(),
+            scale=1 / limits.float(),
+        ).double()
+        if not bool(torch.isfinite(step).all()):
+            break
+        worst = float(step.abs().max())
+        theta = theta.index_put((places,), theta[places] + step * limits / max(1.0, worst))
+        if worst < _CONVERGED:
+            break
+    return theta
+
+
+def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor, *, scale: Tensor) -> Tensor:
+    """One damped Gauss-Newton step [P], in units of 1/scale.
+
+    values [N, K, C]; slopes [N, K, 2, C] per map pixel; jacobian [N, K, 2, P] in map pixels; weights [N, K].
+    """
+    residual = values - _mean(values, weights)
+    squared = residual.square().sum(-1)
+    typical = squared[weights > 0].median() if bool((weights > 0).any()) else squared.new_ones(())
+    weights = weights / (1 + squared / (_ROBUST_SCALE**2 * typical + 1e-6))
+    residual = values - _mean(values, weights)
+    rows = torch.einsum("nkdc,nkdp->nkcp", slopes, jacobian / scale)
+    rows = rows - _mean(rows, weights)  # the mean cell moves along
+    root = weights.sqrt()[..., None]
+    rows = (rows * root[..., None]).reshape(-1, len(scale)).double()
+    normal = rows.T @ rows
+    right = rows.T @ (residual * root).reshape(-1).double()
+    damped = normal + torch.diag(_DAMPING * normal.diagonal() + 1e-9 * normal.diagonal().max() + 1e-12)
+    return -torch.linalg.solve(damped, right)
+
+
+def _mean(values: Tensor, weights: Tensor) -> Tensor:
+    """The weighted mean over the cells: values [N, K, ...], weights [N, K] -> [K, ...]."""
+    total = weights.sum(0).clamp(min=1e-6)
+    flat = values.reshape(*weights.shape, -1)
+    mean = torch.einsum("nk,nkf->kf", weights, flat) / total[:, None]
+    return mean.reshape(values.shape[1:])
