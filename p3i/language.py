@@ -40,7 +40,11 @@ def check(source: str | bytes | Program, *, strict: bool = False) -> tuple[Diagn
     if parsed.holes:
         sketch = sketch_of(parsed)
         return in_order((*parsed.warnings, *(sketch if isinstance(sketch, tuple) else ())))
-    found = (*parsed.warnings, *checker.warnings(parsed.program), *_drawing(parsed.program))
+    found = (
+        *parsed.warnings,
+        *checker.warnings(parsed.program, source=source_text(source)),
+        *_drawing(parsed.program),
+    )
     return in_order(found)
 
 
@@ -58,7 +62,7 @@ def dumps(program: Program, *, layout: Layout = "python") -> str:
 
 
 def load(path: str | os.PathLike[str], *, strict: bool = False) -> Program:
-    """The program in the file at `path`. Raises FileError where it cannot be read, ParseError for its text."""
+    """The program in the file at `path`. Raises FileError for the file, ParseError for its text."""
     return loads(read(path), strict=strict, path=os.fspath(path))
 
 

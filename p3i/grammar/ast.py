@@ -31,6 +31,11 @@ def _number(value: float) -> float:
     return value + 0.0
 
 
+def is_path(text: str) -> bool:
+    """Whether a file can be called so: not empty, no NUL, no lone surrogates."""
+    return bool(text) and "\0" not in text and not any("\ud800" <= mark <= "\udfff" for mark in text)
+
+
 @dataclass(frozen=True, slots=True)
 class Affine:
     """`i*i + j*j + constant`: a number that depends on the loop variables linearly."""
@@ -70,11 +75,8 @@ class Draw:
     comments: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        path = self.picture
-        if path is not None and (
-            not path or "\0" in path or any("\ud800" <= mark <= "\udfff" for mark in path)
-        ):
-            raise ValueError(f"no file can have the path {path!r}")
+        if self.picture is not None and not is_path(self.picture):
+            raise ValueError(f"no file can have the path {self.picture!r}")
 
 
 @dataclass(frozen=True, slots=True)

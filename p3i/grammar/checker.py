@@ -17,9 +17,9 @@ def errors(program: Program, *, source: str = "") -> tuple[Diagnostic, ...]:
     return (*_loop_errors(program), *_scope_errors(program, source))
 
 
-def warnings(program: Program) -> tuple[Diagnostic, ...]:
-    """What is legal and probably not meant."""
-    return (*_reads_as_one(program), *_uneven_ring(program))
+def warnings(program: Program, *, source: str = "") -> tuple[Diagnostic, ...]:
+    """What is legal and probably not meant. With its `source` the places are exact."""
+    return (*_reads_as_one(program, source), *_uneven_ring(program))
 
 
 def _loop_errors(program: Program) -> Iterator[Diagnostic]:
@@ -49,13 +49,13 @@ def _scope_errors(program: Program, source: str) -> Iterator[Diagnostic]:
         allowed = bound | {"i"} if part and lenient else bound  # in bounds and coordinates, not in guards
         for variable, coefficient in (("i", affine.i), ("j", affine.j)):
             if coefficient != 0 and variable not in allowed:
+                place = _place_for(variable, program, source)
                 yield error(
                     "P104",
                     f"`{variable}` is not bound here",
                     _narrowed(affine.span, variable, source),
                     label=f"no enclosing `for {variable}`",
-                    help=f"put `for {variable} in range(0, n):` around {_place_for(variable, program, source)}, "
-                    "or write a number",
+                    help=f"put `for {variable} in range(0, n):` around {place}, or write a number",
                 )
         if name.startswith("for_") and part == "stop":
             bound = bound | {name.removeprefix("for_")}
@@ -70,7 +70,7 @@ def _narrowed(span: Span | None, variable: str, source: str) -> Span | None:
 
 
 def _place_for(variable: str, program: Program, source: str) -> str:
-    """The statement that a loop over `variable` would go around: all of it for i, what is below `for i` for j."""
+    """What a loop over `variable` would go around: everything for i, what is below `for i` for j."""
     world = program.world
     inner = world.body if variable == "j" and isinstance(world, For) and world.variable == "i" else world
     if inner.span is None or not source:
@@ -79,7 +79,7 @@ def _place_for(variable: str, program: Program, source: str) -> str:
 
 
 def _ring_at_the_top(program: Program) -> bool:
-    """Whether the outermost statement is `for j` and both coordinates are Polar (Table 1's top-level ring)."""
+    """Whether `for j` is outermost and both coordinates are Polar: Table 1's top-level ring."""
     world = program.world
     draw = _draw(program)
     return (
@@ -90,7 +90,7 @@ def _ring_at_the_top(program: Program) -> bool:
     )
 
 
-def _reads_as_one(program: Program) -> Iterator[Diagnostic]:
+def _reads_as_one(program: Program, source: str) -> Iterator[Diagnostic]:
     if not _ring_at_the_top(program):
         return
     for path, affine in affines(program):
@@ -98,10 +98,11 @@ def _reads_as_one(program: Program) -> Iterator[Diagnostic]:
             yield warning(
                 "P105",
                 "`i` is not bound here and reads as 1",
-                affine.span,
+                _narrowed(affine.span, "i", source),
                 label="no enclosing `for i`",
                 help="write the number without `i`, or put `for i in range(1, n):` around the ring",
             )
+            return  # once a program: the first place stands for all
 
 
 def _uneven_ring(program: Program) -> Iterator[Diagnostic]:

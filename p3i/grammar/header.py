@@ -143,7 +143,7 @@ def _header(values: dict[str, Any], block: Sequence[Comment]) -> tuple[Header | 
         problems.append(error("P118", f"`{key}` of the header must be {needs}", _line_of(key, block)))
 
     version: Any = values.get("version", 1)
-    if version != 1 or isinstance(version, bool):
+    if version is True or version != 1:
         refuse("version", "1, the only version that this p3i reads")
     canvas: Any = values.get("canvas")
     if canvas is not None and not _is_canvas(canvas):

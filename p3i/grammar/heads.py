@@ -1,4 +1,4 @@
-"""From the rules of p3p.lark to the heads of a program: its camera, loops, guards and draw, one after another.
+"""From the rules of p3p.lark to the heads of a program: camera, loops, guards and draw, one after another.
 
 A program is a chain (each statement holds exactly one), so its heads in order say everything. The reader
 here gives every expression its value (normal.py); tree.py makes the program of the heads.
@@ -11,9 +11,21 @@ from typing import Any
 
 from lark import Token, Transformer
 
-from p3i.grammar.ast import Function, Span
+from p3i.grammar.ast import Function, Span, is_path
 from p3i.grammar.diagnostics import Diagnostic, error
-from p3i.grammar.normal import Blank, Broken, Circular, Linear, Operator, Value, call, combine, negate, number
+from p3i.grammar.normal import (
+    Blank,
+    Broken,
+    Circular,
+    Linear,
+    Operator,
+    Value,
+    call,
+    combine,
+    negate,
+    number,
+    respan,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +84,7 @@ def span_of(token: Token) -> Span:
 
 
 class HeadReader(Transformer[Token, Any]):
-    """The callbacks of the rules of p3p.lark; lark calls them bottom up while it parses, without recursion."""
+    """The callbacks of p3p.lark's rules; lark calls them bottom up while it parses, without recursion."""
 
     def program(self, children: list[Head]) -> tuple[Head, ...]:
         return tuple(children)
@@ -194,13 +206,7 @@ def _between(first: Token, last: Token) -> Span:
 
 
 def _respan(value: Value, span: Span) -> Value:
-    match value:
-        case Linear():
-            return Linear(value.i, value.j, value.constant, span)
-        case Circular():
-            return Circular(value.function, value.radius, value.angle, value.offset, span)
-        case Broken():
-            return Broken(value.diagnostics, span)
+    return Broken(value.diagnostics, span) if isinstance(value, Broken) else respan(value, span)
 
 
 def _left_to_right(children: Sequence[Any]) -> Value:
@@ -214,7 +220,11 @@ def _left_to_right(children: Sequence[Any]) -> Value:
 
 def _guards(children: Sequence[Any]) -> tuple[Value, ...]:
     """The guards of conditions joined by `and` tokens."""
-    return tuple(guard for child in children if isinstance(child, tuple) for guard in child)
+    found: list[Value] = []
+    for child in children:
+        if not isinstance(child, Token):
+            found.extend(child)
+    return tuple(found)
 
 
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "\\": "\\", '"': '"', "'": "'", "/": "/"}
@@ -231,7 +241,7 @@ def _picture(token: Token) -> Picture:
     path = _ESCAPE.sub(
         lambda found: _ESCAPES[found[1]] if len(found[1]) == 1 else chr(int(found[1][1:], 16)), written
     )
-    if not path or "\0" in path or not path.isascii() and any("\ud800" <= mark <= "\udfff" for mark in path):
+    if not is_path(path):
         message = "a picture path is empty or holds a character that no path can have"
         return Picture("", span, (error("P115", message, span, help='write a path such as "mouse.png"'),))
     return Picture(path, span)

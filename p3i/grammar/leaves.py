@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 
 from p3i.errors import ProgramError
-from p3i.grammar.ast import Affine, CameraPose, Coordinate, Draw, For, If, Polar, Program, Statement
+from p3i.grammar.ast import Affine, Coordinate, Draw, For, If, Polar, Program, Statement
 
 _AFFINE_FIELDS = {"i": "i", "j": "j", "1": "constant"}
 

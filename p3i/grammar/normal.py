@@ -14,7 +14,9 @@ from typing import Literal
 from p3i.grammar.ast import Function, Span
 from p3i.grammar.diagnostics import Diagnostic, error
 
-AFFINE_HELP = "a coordinate is `a*i + b*j + c`, or `radius*Cos(angle) + offset` with radius, angle and offset of that form"
+AFFINE_HELP = (
+    "write `a*i + b*j + c`, or `radius*Cos(angle) + offset` with radius, angle and offset of that form"
+)
 Operator = Literal["+", "-", "*", "/"]
 
 
@@ -119,9 +121,17 @@ def call(function: Function, angle: Value, span: Span) -> Value:
 
 def _guarded(compute: Callable[[], Linear | Circular], span: Span) -> Value:
     try:
-        return dataclasses.replace(compute(), span=span)
+        return respan(compute(), span)
     except _RefusedError as refused:
         return Broken((error(refused.code, refused.message, span, help=refused.help),), span)
+
+
+def respan(value: Linear | Circular, span: Span) -> Linear | Circular:
+    """The value at another place; the angle of a ring keeps its own."""
+    if isinstance(value, Linear):
+        return dataclasses.replace(value, span=span)
+    radius, offset = (dataclasses.replace(part, span=span) for part in (value.radius, value.offset))
+    return dataclasses.replace(value, radius=radius, offset=offset, span=span)
 
 
 def _add(left: Linear | Circular, right: Linear | Circular) -> Linear | Circular:
@@ -169,11 +179,11 @@ def _multiply(left: Linear | Circular, right: Linear | Circular) -> Linear | Cir
 def _product(left: Linear, right: Linear) -> Linear:
     for factor, other in ((left, right), (right, left)):
         if _is_constant(factor):
-            if isinstance(factor.constant, float):
+            if not isinstance(factor.constant, Blank):
                 return _linear(_scale(other, factor.constant))
             if _is_unit(other):
                 hole = factor.constant
-                return Linear(*(hole if slot == 1.0 else 0.0 for slot in (other.i, other.j, other.constant)))
+                return _linear(_each_slot(other, lambda slot: hole if slot == 1.0 else 0.0))
     if _has_blank(left) or _has_blank(right):
         raise _folded()
     raise _RefusedError("P106", "a product of loop variables is not affine")
@@ -189,7 +199,7 @@ def _divide(left: Linear | Circular, right: Linear | Circular) -> Linear | Circu
     if isinstance(right, Circular) or not _is_constant(right):
         raise _RefusedError("P106", "only a number can stand below `/`")
     divisor = right.constant
-    if isinstance(divisor, float):
+    if not isinstance(divisor, Blank):
         if divisor == 0:
             raise _RefusedError("P109", "division by zero", "write a number other than 0 below `/`")
         return _each_slot(left, lambda slot: _slot_quotient(slot, divisor))
@@ -198,7 +208,7 @@ def _divide(left: Linear | Circular, right: Linear | Circular) -> Linear | Circu
     if len(numbers) != 1 or isinstance(numbers[0], Blank) or divisor.over is not None:
         raise _folded()
     quotient = dataclasses.replace(divisor, over=numbers[0])
-    return Linear(*(0.0 if slot == 0.0 else quotient for slot in slots))
+    return _each_slot(left, lambda slot: 0.0 if slot == 0.0 else quotient)
 
 
 def _each_slot(value: Linear | Circular, change: Callable[[Slot], Slot]) -> Linear | Circular:
@@ -212,7 +222,7 @@ def _each_slot(value: Linear | Circular, change: Callable[[Slot], Slot]) -> Line
 
 
 def _slot_sum(left: Slot, right: Slot) -> Slot:
-    if isinstance(left, float) and isinstance(right, float):
+    if not isinstance(left, Blank) and not isinstance(right, Blank):
         return _finite(left + right)
     if left == 0.0:
         return right
@@ -222,7 +232,7 @@ def _slot_sum(left: Slot, right: Slot) -> Slot:
 
 
 def _slot_product(slot: Slot, factor: float) -> Slot:
-    if isinstance(slot, float):
+    if not isinstance(slot, Blank):
         return _finite(slot * factor)
     if factor == 1.0:
         return slot
@@ -237,7 +247,7 @@ def _slot_product(slot: Slot, factor: float) -> Slot:
 
 
 def _slot_quotient(slot: Slot, divisor: float) -> Slot:
-    if isinstance(slot, float):
+    if not isinstance(slot, Blank):
         return _finite(slot / divisor)
     return slot if divisor == 1.0 else _refuse_fold()
 

@@ -1,22 +1,16 @@
 """Text -> program, or everything that is wrong with the text. Total: no input raises."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
-from typing import Any
-
-from lark import Lark, Token, UnexpectedInput
-from lark.lark import PostLex
 
 from p3i.grammar import checker
 from p3i.grammar.ast import Program
 from p3i.grammar.diagnostics import Diagnostic, error, in_order
 from p3i.grammar.header import HeaderReading, read_header
-from p3i.grammar.heads import HeadReader, span_of
+from p3i.grammar.heads import span_of
 from p3i.grammar.layout import Words, decode, lay_out, source_text, too_deep, words
 from p3i.grammar.normal import Blank
-from p3i.grammar.recovery import HEAD_RULES, explain_structure, read_heads
+from p3i.grammar.reader import Stopped, lex, read_program
+from p3i.grammar.recovery import explain_structure, read_heads
 from p3i.grammar.tree import Tree, plant
 
 
@@ -62,7 +56,7 @@ def parse_with_holes(source: str | bytes) -> Parsed | tuple[Diagnostic, ...]:
     text = decode(source)
     if isinstance(text, Diagnostic):
         return (text,)
-    found = words(text, superset().lex(text))
+    found = words(text, lex(text))
     refused = too_deep(found.tokens)
     if refused:
         return (refused,)
@@ -82,47 +76,11 @@ def _read(found: Words, reading: HeaderReading, *, end: int) -> tuple[Tree, tupl
     """The tree, and the problems of syntax: first by the whole grammar, then statement by statement."""
     if not found.tokens:
         return plant((), reading, end=end), ()
-    outcome = feed("program", lay_out(found))
-    if isinstance(outcome, tuple):
+    outcome = read_program(lay_out(found))
+    if not isinstance(outcome, Stopped):
         return plant(outcome, reading, end=end), ()
-    heads, problems = read_heads(found, feed)
+    heads, problems = read_heads(found)
     tree = plant(heads, reading, end=end) if heads else Tree(None, {}, ())
     if not problems and not tree.problems:
         problems = (explain_structure(outcome, found),)
     return tree, problems
-
-
-def feed(start: str, tokens: Iterable[Token]) -> Any:
-    """What the rule `start` reads `tokens` as, or the UnexpectedInput that stopped it."""
-    reader = superset().parse_interactive(start=start)
-    last: Token | None = None
-    try:
-        for token in tokens:
-            reader.feed_token(token)
-            last = token
-        return reader.feed_eof(last)
-    except UnexpectedInput as problem:
-        return problem
-
-
-@cache
-def superset() -> Lark:
-    """The reader of p3p.lark, built once a process."""
-    return Lark(
-        files("p3i.grammar").joinpath("p3p.lark").read_text(encoding="utf-8"),
-        parser="lalr",
-        lexer="basic",
-        start=["program", *HEAD_RULES],
-        transformer=HeadReader(),
-        postlex=_KeepEverything(),
-        maybe_placeholders=False,
-    )
-
-
-class _KeepEverything(PostLex):
-    """Keeps the words that no rule mentions in the lexer; layout.py does what a postlex would do."""
-
-    always_accept = ("LINE_END", "COMMENT", "FOREIGN", "STRAY")
-
-    def process(self, stream: Any) -> Any:
-        return stream

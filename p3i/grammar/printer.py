@@ -128,7 +128,8 @@ def _guard(guard: Affine, path: str, holes: Mapping[str, str]) -> str:
 
 def _draw(draw: Draw, path: str, holes: Mapping[str, str]) -> str:
     picture = f"{json.dumps(draw.picture, ensure_ascii=False)}, " if draw.picture is not None else ""
-    return f"Draw({picture}x={_coordinate(draw.x, f'{path}.x', holes)}, y={_coordinate(draw.y, f'{path}.y', holes)})"
+    x, y = (_coordinate(part, f"{path}.{name}", holes) for name, part in (("x", draw.x), ("y", draw.y)))
+    return f"Draw({picture}x={x}, y={y})"
 
 
 def _table1_text(program: Program) -> str:
@@ -146,7 +147,7 @@ def _table1_text(program: Program) -> str:
             case For(variable=variable, start=start, stop=stop):
                 ring = isinstance(_innermost(program).x, Polar) and variable == "j"
                 bounds = ", ".join(
-                    f"{number_text(bound.i)} * i" if ring else number_text(bound.constant)
+                    f"{number_text(bound.i)} * i" if ring else str(int(bound.constant))
                     for bound in (start, stop)
                 )
                 opened.append(f"For ({variable} in range({bounds})) {{")

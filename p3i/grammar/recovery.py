@@ -2,26 +2,22 @@
 
 A program is a chain of heads (camera, loops, guards, draw), each of which starts with its own word. So the
 words are cut before each of those words, and at each line that starts with a stranger, and every piece is
-read by its own rule. What only shows in the whole (a missing indent, a brace that never closes) is explained from
-the place where the whole grammar stopped.
+read by its own rule. What only shows in the whole (a missing indent, a brace that never closes) is
+explained from the place where the whole grammar stopped.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from lark import Token, UnexpectedInput, UnexpectedToken
+from lark import Token
 
 from p3i.grammar.ast import Span
 from p3i.grammar.diagnostics import Diagnostic, error
 from p3i.grammar.heads import Head, span_of
 from p3i.grammar.layout import CLOSING, OPENING, Words
+from p3i.grammar.reader import HEAD_RULES, Stopped, read_head
 
-HEAD_RULES = {"camera": "CAMERA", "for_head": "FOR", "if_head": "IF", "draw": "DRAW"}
-_RULE_OF = {word: rule for rule, word in HEAD_RULES.items()}
 _NAMES = {"CAMERA": "SetCameraPose", "FOR": "for", "IF": "if", "DRAW": "Draw"}
-
-Feed = Callable[[str, Iterable[Token]], Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +29,7 @@ class Piece:
     """Whether a `:` or `{` follows the head."""
 
 
-def read_heads(found: Words, feed: Feed) -> tuple[tuple[Head, ...], tuple[Diagnostic, ...]]:
+def read_heads(found: Words) -> tuple[tuple[Head, ...], tuple[Diagnostic, ...]]:
     """The heads that can be read, and the problems of those that cannot.
 
     Where a head is broken the list of heads is empty: what the rest means depends on it.
@@ -42,12 +38,12 @@ def read_heads(found: Words, feed: Feed) -> tuple[tuple[Head, ...], tuple[Diagno
     problems: list[Diagnostic] = []
     for piece in pieces(found):
         first = piece.tokens[0]
-        rule = _RULE_OF.get(first.type)
+        rule = HEAD_RULES.get(first.type)
         if rule is None:
             problems.append(_stranger(piece))
             continue
-        outcome = feed(rule, piece.tokens)
-        if isinstance(outcome, UnexpectedInput):
+        outcome = read_head(rule, piece.tokens)
+        if isinstance(outcome, Stopped):
             problems.append(_explain(outcome, piece))
             continue
         heads.append(outcome)
@@ -72,7 +68,7 @@ def pieces(found: Words) -> Iterator[Piece]:
     cuts: list[int] = []
     depth = 0
     for position, token in enumerate(found.tokens):
-        if token.type in _RULE_OF and not _is_argument(found.tokens, position):
+        if token.type in HEAD_RULES and not _is_argument(found.tokens, position):
             cuts.append(position)
             depth = 0
         elif position == 0 or (
@@ -170,13 +166,11 @@ def _of_token(token: Token) -> Diagnostic:
     )
 
 
-def _explain(problem: UnexpectedInput, piece: Piece) -> Diagnostic:
+def _explain(problem: Stopped, piece: Piece) -> Diagnostic:
     """Why a head could not be read, from the word that stopped its rule."""
-    assert isinstance(problem, UnexpectedToken)
-    token: Token = problem.token
+    token, expected = problem.token, problem.expected
     tokens = piece.tokens
     statement = _NAMES[tokens[0].type]
-    expected: set[str] = problem.accepts or problem.expected
     if token.type == "$END":
         return _unfinished(tokens, statement, expected)
     if token.type in _BY_TYPE:
@@ -217,7 +211,7 @@ _EXAMPLES = {
 }
 
 
-def _unfinished(tokens: Sequence[Token], statement: str, expected: set[str]) -> Diagnostic:
+def _unfinished(tokens: Sequence[Token], statement: str, expected: frozenset[str]) -> Diagnostic:
     """A head that ends too early: an open bracket is shown where it opens."""
     opened: list[Token] = []
     for token in tokens:
@@ -263,7 +257,7 @@ _SHOWN = {
 }
 
 
-def _wanted(expected: set[str]) -> str | None:
+def _wanted(expected: frozenset[str]) -> str | None:
     """What could stand at a place, in few words."""
     names = [shown for name, shown in _SHOWN.items() if name in expected]
     if "NUMBER" in expected:
@@ -273,11 +267,9 @@ def _wanted(expected: set[str]) -> str | None:
     return f"expected {' or '.join(names[:3])}"
 
 
-def explain_structure(problem: UnexpectedInput, found: Words) -> Diagnostic:
+def explain_structure(problem: Stopped, found: Words) -> Diagnostic:
     """Why heads that are all well formed do not nest: indentation, braces, separators."""
-    assert isinstance(problem, UnexpectedToken)
-    token: Token = problem.token
-    expected: set[str] = problem.accepts or problem.expected
+    token, expected = problem.token, problem.expected
     unclosed = _unclosed_brace(found.tokens)
     if token.type == "$END" or (unclosed is not None and token.type in {"_NL", "_DEDENT"}):
         if unclosed is not None:

@@ -1,7 +1,7 @@
 """The one place where diagnostics become text: for people (with the line and a caret) and as JSON.
 
 The layout for people is that of DESIGN.md section 6. Nothing that a program's text holds can disturb the
-terminal: control characters are shown as `\N{REPLACEMENT CHARACTER}`, one column each, and wide characters count as two columns.
+terminal: control characters are shown as U+FFFD, and wide characters count as two columns.
 """
 
 import json
@@ -133,7 +133,7 @@ def _line_with_carets(span: Span, *, source: str, starts: list[int]) -> tuple[st
 
 
 def printable(text: str) -> str:
-    """`text` safe for a terminal: tabs as four spaces, every other control or unencodable character as one mark."""
+    """`text` safe for a terminal: tabs as four spaces, other control and unencodable characters as U+FFFD."""
     return "".join(
         "    "
         if character == "\t"

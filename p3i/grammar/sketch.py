@@ -4,6 +4,7 @@ A hole is written `??` (free), `??(10, 40)` (bounds), `?r` or `?r(10, 40)` (equa
 `~18.7` (start here and refine). `360/?n*j` in an angle ties the step of a ring to its count.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -20,7 +21,7 @@ class Hole:
     """A number to be found, at a path of the template (grammar/leaves.py names the paths).
 
     `lower` and `upper` bound it, `start` is where to begin, `whole` says that it is a whole number; holes of
-    one `name` are one number and share the four. The number at the path is the hole's, or `over` divided by it.
+    one `name` are one number. The number at the path is the hole's, or `over` divided by it.
     """
 
     path: str
@@ -130,10 +131,17 @@ def _problems(hole: Hole, blank: Blank, first: Blank) -> Sequence[Diagnostic]:
     if hole.whole and any(bound != int(bound) for bound in bounds):
         message = "a hole in a bound is a whole number, and so are its limits"
         found.append(error("P117", message, blank.span, help="write whole numbers, as in `?n(4, 24)`"))
-    if hole.over is not None and hole.lower is not None and hole.lower <= 0:
-        message = "a number is divided by this hole, which may be zero"
+    if hole.over is not None and not _divides(hole):
+        message = "a number is divided by this hole, which may be zero, or too close to it"
         found.append(error("P117", message, blank.span, help="let its bounds begin at 1"))
     return found
+
+
+def _divides(hole: Hole) -> bool:
+    """Whether a number can be divided by whatever the hole may hold."""
+    if hole.start == 0 or (hole.lower is not None and hole.lower <= 0):
+        return False
+    return math.isfinite(hole.leaf(hole.first_value()))
 
 
 def _hole_text(hole: Hole, *, bounded: bool) -> str:

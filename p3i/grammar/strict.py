@@ -1,15 +1,16 @@
 """Strict mode: Table 1 to the letter (table1.lark), and where and how a program leaves it."""
 
 from collections.abc import Iterator
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
-from lark import Lark, Token, Transformer, UnexpectedInput, UnexpectedToken
+from lark import Token, Transformer
 
+from p3i.grammar import reader
 from p3i.grammar.ast import Affine, CameraPose, Coordinate, Draw, For, If, Polar, Program, Span, Variable
 from p3i.grammar.diagnostics import Diagnostic, error, in_order
+from p3i.grammar.heads import span_of
 from p3i.grammar.leaves import statements
+from p3i.grammar.reader import Stopped
 
 PRODUCTIONS = {
     "Program": "Program -> CameraProgram; WorldProgram",
@@ -35,25 +36,22 @@ def strict_problems(text: str, program: Program) -> tuple[Diagnostic, ...]:
     Where the program itself leaves the table, every such place is named (P301); else the first word that is
     not spelt as the table spells it (P302).
     """
-    outcome = read_table1(text)
+    outcome = read_strictly(text)
     if isinstance(outcome, Program):
         return ()
     return departures(program) or (_misspelt(outcome, text, program),)
 
 
-def read_table1(text: str) -> Program | UnexpectedInput:
+def read_strictly(text: str) -> Program | Stopped:
     """The program that `text` spells by table1.lark alone, without spans and comments, or what stopped it.
 
     Raises ValueError for a numeral beyond the range of a double, which the superset's reader refuses first.
     """
-    try:
-        return _table1().parse(text)  # pyright: ignore[reportReturnType]  # the reader makes a Program of `program`
-    except UnexpectedInput as problem:
-        return problem
+    return reader.read_table1(text, _TableReader())
 
 
 def departures(program: Program) -> tuple[Diagnostic, ...]:
-    """Every place where the program, however spelt, lies outside Table 1, with the production that it leaves."""
+    """Every place where the program, however spelt, lies outside Table 1, with the production it leaves."""
     return in_order(_departures(program))
 
 
@@ -109,21 +107,18 @@ def _coordinate_departures(name: str, coordinate: Coordinate, *, ring: bool) -> 
 
 def _leaves(production: str, span: Span | None, *, help: str) -> Diagnostic:
     message = f"this leaves Table 1 at `{production}`: `{PRODUCTIONS[production]}`"
-    return error("P301", message, span, label=f"not a `{production}`", help=help)
+    return error("P301", message, span, label=f"no `{production}`", help=help)
 
 
-def _misspelt(problem: UnexpectedInput, text: str, program: Program) -> Diagnostic:
+def _misspelt(problem: Stopped, text: str, program: Program) -> Diagnostic:
     """The first word that Table 1 spells otherwise."""
-    offset = min(problem.pos_in_stream or 0, len(text))
-    end = offset + 1
-    if isinstance(problem, UnexpectedToken) and problem.token.type == "$END":
-        offset, end = len(text.rstrip()), len(text.rstrip()) + 1
-    elif isinstance(problem, UnexpectedToken):
-        end = offset + len(problem.token)
-    production = _production_at(program, offset)
+    span = span_of(problem.token)
+    if problem.token.type == "$END":
+        span = Span(len(text.rstrip()), len(text.rstrip()) + 1)
+    production = _production_at(program, span.start)
     message = f"this is not spelt as in Table 1: `{PRODUCTIONS[production]}`"
     help = "`p3i fmt --layout table1` writes it so"
-    return error("P302", message, Span(offset, end), label=f"in `{production}`", help=help)
+    return error("P302", message, span, label=f"in `{production}`", help=help)
 
 
 def _production_at(program: Program, offset: int) -> str:
@@ -180,8 +175,10 @@ class _TableReader(Transformer[Token, Any]):
 
     def _loop(self, variable: Variable, children: list[Any]) -> For:
         *_, start, stop, body = children
-        bounds = (bound if isinstance(bound, Affine) else Affine(constant=bound) for bound in (start, stop))
-        return For(variable, *bounds, body)
+        first, last = (
+            bound if isinstance(bound, Affine) else Affine(constant=bound) for bound in (start, stop)
+        )
+        return For(variable, first, last, body)
 
     def cond_stmt(self, children: list[Any]) -> If:
         _, guard, _, _, body = children
@@ -191,7 +188,8 @@ class _TableReader(Transformer[Token, Any]):
         _, _, x, _, y = children
         return Draw(x, y)
 
-    rotate_draw_stmt = draw_stmt
+    def rotate_draw_stmt(self, children: list[Any]) -> Draw:
+        return self.draw_stmt(children)
 
     def expr(self, children: list[Any]) -> Affine:
         i, _, j, _ = children
@@ -214,11 +212,5 @@ class _TableReader(Transformer[Token, Any]):
     def real(self, children: list[Token]) -> float:
         return float(children[0])
 
-    integer = real
-
-
-@cache
-def _table1() -> Lark:
-    """The reader of table1.lark, built once a process and only in strict mode."""
-    grammar = files("p3i.grammar").joinpath("table1.lark").read_text(encoding="utf-8")
-    return Lark(grammar, parser="lalr", start="program", transformer=_TableReader())
+    def integer(self, children: list[Token]) -> float:
+        return float(children[0])

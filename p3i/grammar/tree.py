@@ -39,10 +39,10 @@ class Planting:
 
     def number(self, slot: Slot, path: str) -> float:
         """The number of a slot; a hole is noted under its path."""
-        if isinstance(slot, float):
-            return slot
-        self.holes[path] = slot
-        return UNFILLED
+        if isinstance(slot, Blank):
+            self.holes[path] = slot
+            return UNFILLED
+        return slot
 
     def affine(self, value: Value, path: str, *, what: str) -> Affine:
         match value:
@@ -210,8 +210,7 @@ def _for(head: ForHead, planting: Planting, comments: tuple[str, ...]) -> For:
         message = "`range` takes a start and a stop, no step"
         help = "leave the step out and multiply in Draw: `2*i` walks in twos"
         planting.refuse("P108", message, head.bounds[2].span, help=help)
-    first, *more = head.bounds[:2]
-    start, stop = (first, more[0]) if more else (Linear(span=first.span), first)
+    start, stop = head.bounds[:2] if len(head.bounds) > 1 else (Linear(span=head.span), *head.bounds)
     what = f"a bound of `for {head.variable}`"
     return For(
         variable,
