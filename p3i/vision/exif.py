@@ -17,8 +17,8 @@ PIXEL_HEIGHT = 0xA003
 ORIENTATION = 0x0112
 EXIF_BLOCK = 0x8769
 
-# Of a TIFF: sizes, depths, strips and tiles, compression, extra samples, tables, profile. They describe the old
-# file's pixels and would contradict the new one's.
+# Of a TIFF: sizes, depths, strips and tiles, compression, extra samples, tables, profile. They describe the
+# old file's pixels and would contradict the new one's.
 _STORAGE_TAGS = {
     256,
     257,
@@ -103,7 +103,7 @@ def focal_from_exif(exif: Pil.Exif, size: Size) -> ExifFocal:
 
 
 def upright_exif(exif: bytes) -> bytes:
-    """The EXIF block of a picture that is written upright: orientation 1, and nothing of how it was stored."""
+    """The EXIF block of a picture that is written upright: orientation 1, and nothing of its storage."""
     block = Pil.Exif()
     block.load(exif)
     for tag in _STORAGE_TAGS & set(block):

@@ -8,8 +8,8 @@ def filled(array: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """The array with its unknown pixels replaced by a smooth continuation of the known ones.
 
     Shapes: array [H, W, C] float32 with C <= 4, valid bool [H, W] -> [H, W, C]. Push-pull: the known pixels
-    are averaged down a pyramid, and what is unknown is read from the first level that knows. The values
-    of unknown pixels are never read. Where nothing at all is known the answer is 0.
+    are averaged down a pyramid, and what is unknown is read from the coarser levels, mixed by how much they
+    know. The values of unknown pixels are never read. Where nothing at all is known the answer is 0.
     """
     if valid.all():
         return array
@@ -36,4 +36,5 @@ def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], -1)
     smaller_weight = cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     coarse = cv2.resize(_push_pull(smaller, smaller_weight), (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.where(weight[:, :, None] >= 1, value, coarse.reshape(value.shape))
+    coarse = coarse.reshape(value.shape)
+    return np.where(weight[:, :, None] >= 1, value, coarse + weight[:, :, None] * (value - coarse))

@@ -11,7 +11,7 @@ from p3i.vision.raw import RawFeatures
 
 # Width of the Gaussian, in pixels of the working image (DESIGN.md, 4.1).
 _SIGMA = 1.0
-# It reaches that far; a central difference adds a pixel.
+# The Gaussian is cut off at 3 sigma, and a central difference adds a pixel.
 _REACH = 4
 # Gradients (Lab units per pixel) far below the step of an 8-bit picture (0.4) have no direction worth
 # dividing by.
@@ -25,7 +25,7 @@ def oriented(image: Image) -> RawFeatures:
     does not tell black on white from white on black. Known where everything within 4 pixels is.
     """
     lab = lab_of(filled(image.pixels, image.valid))
-    smooth = cv2.GaussianBlur(lab, (0, 0), _SIGMA, borderType=cv2.BORDER_REPLICATE)
+    smooth = cv2.GaussianBlur(lab, (7, 7), _SIGMA, borderType=cv2.BORDER_REPLICATE)
     planes = np.empty((9, *image.valid.shape), np.float32)
     for channel in range(3):
         plane = np.ascontiguousarray(smooth[:, :, channel])

@@ -87,7 +87,9 @@ def test_a_tiff_gives_its_camera_but_not_its_strips_to_a_jpeg(tmp_path, pixels):
     source = read_image(tmp_path / "a.tif").source
     write_image(tmp_path / "b.jpg", pixels, exif=source.exif)
     with Pil.open(tmp_path / "b.jpg") as picture:
-        assert dict(picture.getexif()) == {0x010F: "Camera works", 0x0112: 1}
+        found = dict(picture.getexif())
+        found.pop(0x8769, None)  # an empty block of the camera's own tags
+        assert found == {0x010F: "Camera works", 0x0112: 1}
 
 
 def test_text_is_kept_in_a_png(pixels):
