@@ -1,0 +1,262 @@
+"""Programs as pictures: alone, over their photo, or straightened; with dots, cells, or pictures."""
+
+import dataclasses
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from p3i.errors import FileError, UsageError
+from p3i.grammar.ast import Program
+from p3i.grammar.printer import format_program
+from p3i.interp.camera import Camera
+from p3i.interp.compile import compile
+from p3i.interp.unroll import distinct, nest, points
+from p3i.paint import outlines, scene
+from p3i.paint.options import KINDS, RenderOptions
+from p3i.paint.pdf import pdf
+from p3i.paint.photo import photo_layer, scaled
+from p3i.paint.raster import paint
+from p3i.paint.source import PNG_KEYWORD, read_program
+from p3i.paint.sprite import lay, sprite_of
+from p3i.paint.svg import svg
+from p3i.paint.view import (
+    AUTO_PX,
+    View,
+    camera_view,
+    fitted_camera_view,
+    refuse_huge,
+    straight_view,
+)
+from p3i.size import Size
+from p3i.vision.image import Image, read_image
+from p3i.vision.write import encode, write_bytes
+
+Path_ = str | PathLike[str]
+FocalSource = Literal["option", "header", "exif", "default"]
+
+_DOT_SHARE = 0.2
+"""A dot's radius as a share of the spacing."""
+
+_SPRITE_SHARE = 0.9
+"""A sprite's longer side as a share of the spacing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedPicture:
+    """A drawn program, ready to become a file of any kind.
+
+    `camera` is the one that it was drawn with, `focal_source` says where its focal comes from; `centers_px`
+    [M, 2] are the objects on the canvas (nan where they are not in front of the camera), `index` [M, 2]
+    their (i, j); `notes` are sentences for the user.
+    """
+
+    scene: scene.Scene
+    program: Program
+    camera: Camera
+    focal_source: FocalSource
+    centers_px: np.ndarray
+    index: np.ndarray
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> Size:
+        """The canvas."""
+        return self.scene.size
+
+    def pixels(self) -> np.ndarray:
+        """The picture as uint8 [H, W, 3] RGB, or [H, W, 4] with plain alpha over a transparent photo."""
+        return paint(self.scene)
+
+    def encode(self, kind: str) -> bytes:
+        """The bytes of a file of `kind` (png, svg or pdf); PNG and SVG carry the program's text.
+
+        Raises UsageError for another kind.
+        """
+        text = format_program(self.program)
+        if kind == "svg":
+            return svg(self.scene, program_text=text).encode("utf-8")
+        if kind == "pdf":
+            return pdf(self.scene)
+        if kind != "png":
+            raise UsageError(f"p3i draws {', '.join(KINDS)}, not {kind!r}")
+        values = self.pixels()
+        alpha = values[:, :, 3].astype(np.float32) / 255 if values.shape[2] == 4 else None
+        colours = np.ascontiguousarray(values[:, :, :3])
+        return encode(colours, kind=".png", alpha=alpha, text={PNG_KEYWORD: text})
+
+    def save(self, path: Path_, *, kind: str | None = None, force: bool = False) -> None:
+        """Write a file, whole or not at all, its kind by the suffix unless `kind` says; `-` is stdout.
+
+        Raises UsageError for an unknown kind, FileError where `path` exists (without `force`) or cannot be
+        written.
+        """
+        write_bytes(path, self.encode(kind or kind_of(path)), force=force)
+
+
+def render(
+    program: Program | Path_,
+    options: RenderOptions | None = None,
+    *,
+    image: Path_ | Image | None = None,
+    sprite: Path_ | Image | None = None,
+    beside: Path_ | None = None,
+    **changes: Any,
+) -> RenderedPicture:
+    """Draw a program: dots coloured by loop index, cells, horizon, or a picture at each object.
+
+    `program` may be a file, also a PNG or SVG that was drawn here before. With `image` the drawing goes over
+    that photo; with `plane` the plane is seen straight on (and the photo straightened). `sprite` stands at
+    every object, flat on the plane, and wins over the picture named in `Draw`, which is looked up beside the
+    program's file, or in the folder `beside`. `changes` are fields of RenderOptions.
+
+    Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
+    sketches among them, UsageError for options that cannot be.
+    """
+    options = _changed(options or RenderOptions(), changes)
+    if not isinstance(program, Program):
+        beside = Path(fspath(program)).parent if beside is None else beside
+        program = read_program(program)
+    folder = Path(beside or ".")
+    photo = read_image(image) if isinstance(image, str | PathLike) else image
+    camera, focal_source = _camera(program, options, photo)
+
+    pattern = compile(program)
+    found = points(program)
+    # Coinciding draws are one object: painted twice, what is half transparent would not be.
+    kept = [found[place] for place in distinct(found)]
+    objects = np.array([place[:2] for place in kept], dtype=np.float64).reshape(-1, 2)
+    index = np.array([place[2:] for place in kept], dtype=np.int64).reshape(-1, 2)
+    chart = outlines.chart_of(pattern)
+    spacing = outlines.pitch(chart)
+
+    view = _view(program, options, camera, photo, outlines.surroundings(chart, index))
+    if photo is not None and options.size is not None and not options.plane:
+        photo = scaled(photo, options.size)
+    pictures = _sprite(program, sprite, folder)
+    layers: list[scene.Layer] = []
+    if photo is not None:
+        layers.append(scene.Pixels(photo_layer(photo, view, camera)))
+    bare = photo is None and pictures is None
+    if options.cells if options.cells is not None else bare:
+        segments = outlines.sides(chart, index)
+        layers += scene.grid(view, segments, over_photo=not bare)
+    if pictures is not None:
+        units = options.sprite_units or _SPRITE_SHARE * spacing
+        layers.append(scene.Pixels(lay(view, sprite_of(pictures), objects, units=units)))
+    if options.horizon:
+        layers += scene.horizon(view, over_photo=photo is not None)
+    if options.markers if options.markers is not None else pictures is None:
+        loops = sum(loop is not None for loop in (nest(program).for_i, nest(program).for_j))
+        colours = scene.colours_of(index, loops=loops)
+        radius = _DOT_SHARE * spacing
+        layers.append(scene.dots(view, objects, radius=radius, colours=colours, light_rim=photo is not None))
+    see_through = layers and isinstance(layers[0], scene.Pixels) and layers[0].values.shape[2] == 4
+    paper = None if photo is not None and see_through else scene.WHITE
+    centers_px, depth = view.project(objects)
+    return RenderedPicture(
+        scene.Scene(view.size, paper, tuple(layers)),
+        program,
+        camera,
+        focal_source,
+        centers_px,
+        index,
+        _notes(program, photo, depth, options),
+    )
+
+
+def overlay(
+    image: Path_ | Image, program: Program | Path_, options: RenderOptions | None = None, **changes: Any
+) -> RenderedPicture:
+    """The photo with the program drawn over it; `render` with `image`, for callers who start at the photo."""
+    return render(program, options, image=image, **changes)
+
+
+def kind_of(path: Path_) -> str:
+    """The kind of file that a name asks for; raises UsageError for one that is not drawn."""
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in KINDS:
+        known = ", ".join(f".{kind}" for kind in KINDS)
+        raise UsageError(f"cannot tell the kind of picture from {fspath(path)!r}: end the name in {known}")
+    return suffix
+
+
+def _changed(options: RenderOptions, changes: dict[str, Any]) -> RenderOptions:
+    known = {field.name for field in dataclasses.fields(RenderOptions)}
+    if unknown := sorted(changes.keys() - known):
+        raise UsageError(f"render has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
+    return dataclasses.replace(options, **changes) if changes else options
+
+
+def _camera(program: Program, options: RenderOptions, photo: Image | None) -> tuple[Camera, FocalSource]:
+    header_mm = program.header.focal_mm if program.header else None
+    choices: list[tuple[float | None, FocalSource]] = [(options.focal_mm, "option"), (header_mm, "header")]
+    choices.append((photo.focal_mm if photo else None, "exif"))
+    for focal_mm, origin in choices:
+        if focal_mm is not None:
+            return Camera.of(program, focal_mm=focal_mm), origin
+    return Camera.of(program), "default"
+
+
+def _canvas(program: Program, options: RenderOptions, photo: Image | None) -> Size | None:
+    """The canvas: by the option, then the photo, then the header; None where nobody says."""
+    if options.size is not None:
+        return options.size
+    if photo is not None:
+        return photo.size
+    if program.header is not None and program.header.canvas is not None:
+        return Size(*program.header.canvas)
+    return None
+
+
+def _view(
+    program: Program, options: RenderOptions, camera: Camera, photo: Image | None, cells: np.ndarray
+) -> View:
+    canvas = _canvas(program, options, photo)
+    if canvas is not None:
+        refuse_huge(canvas, max_px=options.max_px)
+    if options.plane:
+        longer = canvas.longer if canvas is not None else AUTO_PX
+        view = straight_view(camera, cells, size=options.size, longer=longer)
+    elif canvas is not None:
+        view = camera_view(camera, canvas)
+    else:
+        view = fitted_camera_view(camera, cells)
+    refuse_huge(view.size, max_px=options.max_px)
+    return view
+
+
+def _sprite(program: Program, sprite: Path_ | Image | None, folder: Path) -> Image | None:
+    """The picture that stands at the objects: the one given, else the one that `Draw` names."""
+    if isinstance(sprite, Image):
+        return sprite
+    if sprite is not None:
+        return read_image(sprite)
+    named = nest(program).draw.picture
+    if named is None:
+        return None
+    try:
+        return read_image(folder / named)
+    except FileError as error:
+        raise FileError(f"the picture of Draw(...): {error}") from None
+
+
+def _notes(
+    program: Program, photo: Image | None, depth: np.ndarray, options: RenderOptions
+) -> tuple[str, ...]:
+    notes: list[str] = list(photo.notes) if photo is not None else []
+    canvas = program.header.canvas if program.header else None
+    if photo is not None and canvas is not None and not options.plane:
+        shapes = [photo.size.width / photo.size.height, canvas[0] / canvas[1]]
+        if abs(shapes[0] - shapes[1]) > 0.01 * max(shapes):
+            notes.append(
+                f"the program was made for a canvas of {canvas[0]} x {canvas[1]}, whose shape is not that of "
+                f"this photo of {photo.size.width} x {photo.size.height}"
+            )
+    if not len(depth):
+        notes.append("the program draws nothing")
+    elif behind := int((depth <= 0).sum()):
+        notes.append(f"{behind} of {len(depth)} objects lie at or behind the camera and are not drawn")
+    return tuple(notes)

@@ -1,0 +1,66 @@
+"""The one record of options that drawing takes: the Python API and the command line both read it.
+
+Each field carries the sentence that documents it, so `p3i render --help` and `help(RenderOptions)` cannot
+differ. Imports neither torch nor numpy: `p3i render --help` reads this file.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, get_type_hints
+
+from p3i.errors import UsageError
+from p3i.size import Size
+
+KINDS = ("png", "svg", "pdf")
+"""What `RenderedPicture.encode` can make."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RenderOptions:
+    """What to draw of a program, and how large. Raises UsageError for a value out of range."""
+
+    size: Annotated[
+        Size | None,
+        "Width and height of the picture in pixels; by default those of the photo, else of the program's "
+        "canvas, else what fits the drawn objects.",
+    ] = None
+    plane: Annotated[bool, "Draw the plane as seen straight on instead of as the camera sees it."] = False
+    markers: Annotated[
+        bool | None, "Mark each object by a dot, coloured by its index; by default where no picture stands."
+    ] = None
+    cells: Annotated[
+        bool | None,
+        "Outline each object's cell; by default on an empty canvas, not over a photo or pictures.",
+    ] = None
+    horizon: Annotated[bool, "Draw the plane's vanishing line, where it crosses the picture."] = False
+    sprite_units: Annotated[
+        float | None,
+        "The longer side of an object's picture in program units; by default a little less than the spacing.",
+    ] = None
+    focal_mm: Annotated[
+        float | None,
+        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
+    ] = None
+    max_px: Annotated[int, "Refuse to make pictures of more than N pixels (width times height)."] = (
+        100_000_000
+    )
+
+    def __post_init__(self) -> None:
+        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        units = self.sprite_units
+        if units is not None and not (math.isfinite(units) and 0 < units <= 1e6):
+            raise UsageError(f"a picture's side is more than 0 program units, not {units:g}")
+        if self.max_px < 1:
+            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+
+
+def sentence(name: str) -> str:
+    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
+    return get_type_hints(RenderOptions, include_extras=True)[name].__metadata__[0]
+
+
+def default(name: str) -> Any:
+    """The default of the field `name`; raises KeyError where there is no such field."""
+    return {field.name: field.default for field in dataclasses.fields(RenderOptions)}[name]
