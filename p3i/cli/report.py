@@ -54,9 +54,17 @@ def line(
     click.echo(f"{prefix} {message}", err=True, color=coloured())
 
 
-def p3i_error(error: P3IError, *, as_json: bool = False, image: str | None = None) -> int:
-    """Report an error that p3i raised on purpose; returns its exit code."""
-    line(str(error), as_json=as_json, code=error.exit_code, image=image)
+def p3i_error(error: P3IError, *, as_json: bool = False) -> int:
+    """Report an error that p3i raised on purpose; returns its exit code.
+
+    It is one line, save for a program's text with errors, which is shown with all of them, as by `check`.
+    """
+    from p3i.grammar.diagnostics import ParseError  # read here, so that `--help` does not
+
+    if isinstance(error, ParseError):
+        click.echo(error.report(as_json=as_json, color=coloured()), nl=False, err=True, color=coloured())
+    else:
+        line(str(error), as_json=as_json, code=error.exit_code)
     return error.exit_code
 
 
@@ -71,11 +79,11 @@ def click_error(error: click.ClickException, *, as_json: bool = False) -> int:
     return code
 
 
-def bug(error: BaseException, *, as_json: bool = False, image: str | None = None) -> int:
+def bug(error: BaseException, *, as_json: bool = False) -> int:
     """Report an exception that nobody foresaw, in one line; returns 70. P3I_DEBUG=1 adds the traceback."""
     if os.environ.get("P3I_DEBUG"):
         traceback.print_exception(error)
-    line(bug_sentence(error), as_json=as_json, code=70, image=image)
+    line(bug_sentence(error), as_json=as_json, code=70)
     return 70
 
 

@@ -1,0 +1,29 @@
+"""The answer's reasons are sentences, and its record is that of the documented JSON lines."""
+
+import pytest
+
+from p3i.grammar.ast import Affine, CameraPose, Draw, Program
+from p3i.search.record import answer_record
+from p3i.search.result import StopReason, SynthesisResult
+
+PROGRAM = Program(CameraPose(), Draw(x=Affine(), y=Affine()))
+
+
+def test_a_refusal_names_the_best_score_and_the_one_that_is_needed() -> None:
+    result = SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.123, needed=0.35)
+    assert result.reason == "no regular pattern (best 0.12, needs 0.35)"
+
+
+def test_a_refusal_without_any_candidate_names_no_score() -> None:
+    assert SynthesisResult(program=None, stop=StopReason.NO_PATTERN).reason == "no regular pattern"
+
+
+def test_an_answer_needs_no_reason() -> None:
+    assert SynthesisResult(program=PROGRAM, stop=StopReason.FOUND).reason == ""
+
+
+@pytest.mark.parametrize("program", [None, PROGRAM])
+def test_only_a_program_with_a_canvas_has_a_record(program: Program | None) -> None:
+    result = SynthesisResult(program=program, stop=StopReason.FOUND)
+    with pytest.raises(ValueError, match="canvas"):
+        answer_record(result, image="a.jpg", seconds=1.0)
