@@ -12,6 +12,7 @@ from p3i.grammar import checker
 from p3i.grammar.ast import Program, Span
 from p3i.grammar.diagnostics import Diagnostic, ParseError, in_order, warning
 from p3i.grammar.layout import source_text
+from p3i.grammar.leaves import comments
 from p3i.grammar.parser import parse, parse_with_holes
 from p3i.grammar.printer import Layout, format_program
 from p3i.grammar.sketch import Sketch, format_sketch, parse_sketch, sketch_of
@@ -57,7 +58,7 @@ def loads(source: str | bytes, *, strict: bool = False, path: str = "<program>")
 
 
 def dumps(program: Program, *, layout: Layout = "python") -> str:
-    """The program's text. Raises ProgramError for layout "table1" outside Table 1."""
+    """The program's text. Raises ParseError for layout "table1" outside Table 1."""
     return format_program(program, layout=layout)
 
 
@@ -72,13 +73,17 @@ def dump(program: Program, path: str | os.PathLike[str], *, layout: Layout = "py
 
 
 def format(
-    source: str | bytes | Program | Sketch, *, layout: Layout | None = None, strict: bool = False
+    source: str | bytes | Program | Sketch,
+    *,
+    layout: Layout | None = None,
+    strict: bool = False,
+    path: str = "<program>",
 ) -> str:
     """The canonical text of a program or a sketch: comments and header stay, in order.
 
-    With `strict` the source must be spelt as in Table 1, and so is the result. Raises ParseError for a
-    text with errors, ProgramError for layout "table1" outside Table 1, UsageError for `strict` with layout
-    "python", in which Table 1 has no text.
+    With `strict` the source must be spelt as in Table 1, and so is the result. `path` names the source in
+    errors. Raises ParseError for a text with errors and for layout "table1" outside Table 1, UsageError for
+    `strict` with layout "python", in which Table 1 has no text, and for a sketch in layout "table1".
     """
     if strict and layout == "python":
         raise UsageError("strict text exists in layout table1 only: leave out the layout, or strict")
@@ -87,38 +92,54 @@ def format(
         return format_program(source, layout=layout)
     if isinstance(source, Sketch):
         return _format_sketch(source, layout)
-    if strict:
-        return format_program(loads(source, strict=True), layout=layout)
-    sketch = parse_sketch(source)
-    if isinstance(sketch, tuple):
-        raise ParseError(sketch, source=source_text(source))
-    return _format_sketch(sketch, layout) if sketch.holes else format_program(sketch.template, layout=layout)
+    read = _sketch_without_holes(source) if strict else parse_sketch(source)
+    if isinstance(read, tuple):
+        raise ParseError(read, source=source_text(source), path=path)
+    try:
+        return _format_sketch(read, layout)
+    except ParseError as outside:
+        raise ParseError(outside.diagnostics, source=source_text(source), path=path) from None
 
 
-def verify_format(source: str | bytes, text: str, *, strict: bool = False) -> None:
-    """Hold `text`, the format of `source`, to the first two laws of the language before it replaces a file.
+def _sketch_without_holes(source: str | bytes) -> Sketch | tuple[Diagnostic, ...]:
+    """The program that `source` spells in strict mode, as a sketch."""
+    program = parse(source, strict=True)
+    return program if isinstance(program, tuple) else Sketch(program, ())
 
-    Raises FormatLawError where `text` means something else than `source`, or is no fixed point.
+
+def verify_format(
+    source: str | bytes, text: str, *, layout: Layout | None = None, strict: bool = False
+) -> None:
+    """Hold `text`, the format of `source` with these options, to the first two laws of the language.
+
+    Comments are held too, in their order. Raises FormatLawError where `text` means something else than `source`, or is no fixed point.
     """
     before, after = parse_sketch(source), parse_sketch(text)
-    if isinstance(before, tuple) or isinstance(after, tuple) or before != after:
-        raise FormatLawError("the formatted text does not mean what the file means")
-    layout: Layout = "table1" if text != _format_sketch(after, "python") else "python"
-    if format(text, layout=layout, strict=strict and layout == "table1") != text:
-        raise FormatLawError("formatting twice gives another text than formatting once")
+    if isinstance(before, tuple) or isinstance(after, tuple) or not _same(before, after):
+        raise FormatLawError("p3i would have changed the meaning of this program; it was left alone")
+    if format(text, layout=layout, strict=strict) != text:
+        raise FormatLawError("p3i would format this program differently a second time; it was left alone")
+
+
+def _same(before: Sketch, after: Sketch) -> bool:
+    return before == after and comments(before.template) == comments(after.template)
 
 
 class FormatLawError(P3IError):
     """A bug of the printer, caught before it touched a file."""
 
 
-def expand(source: str | bytes | Program) -> list[Point]:
+def expand(source: str | bytes | Program, *, path: str = "<program>") -> list[Point]:
     """Every draw as (x, y, i, j) in program units, in the order of the loops, coinciding draws included.
 
-    Raises ParseError for a text with errors, for loops that turn too often and for coordinates that overflow.
+    Raises ParseError for a text with errors, for loops that turn too often and coordinates that overflow.
     """
-    program = source if isinstance(source, Program) else loads(source)
-    return unroll.points(program)
+    if isinstance(source, Program):
+        return unroll.points(source)
+    try:
+        return unroll.points(loads(source, path=path))
+    except ParseError as refused:
+        raise ParseError(refused.diagnostics, source=source_text(source), path=path) from None
 
 
 def read(path: str | os.PathLike[str]) -> bytes:

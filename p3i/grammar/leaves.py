@@ -80,6 +80,13 @@ def affines(program: Program) -> Iterator[tuple[str, Affine]]:
                 yield from _coordinate_affines(f"{path}.y", y)
 
 
+def comments(program: Program) -> tuple[str, ...]:
+    """All comments of the program in the order of the text, those of the header block aside."""
+    above = program.header.comments if program.header else ()
+    inside = (comment for _, statement in statements(program) for comment in statement.comments)
+    return (*above, *program.camera.comments, *inside, *program.trailing_comments)
+
+
 def map_affines(program: Program, change: Callable[[str, Affine], Affine]) -> Program:
     """The program with every affine replaced by `change(path, affine)`."""
 

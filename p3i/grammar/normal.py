@@ -182,11 +182,15 @@ def _product(left: Linear, right: Linear) -> Linear:
             if not isinstance(factor.constant, Blank):
                 return _linear(_scale(other, factor.constant))
             if _is_unit(other):
-                hole = factor.constant
-                return _linear(_each_slot(other, lambda slot: hole if slot == 1.0 else 0.0))
+                return _placed(factor.constant, other)
     if _has_blank(left) or _has_blank(right):
         raise _folded()
     raise _RefusedError("P106", "a product of loop variables is not affine")
+
+
+def _placed(hole: Blank, unit: Linear) -> Linear:
+    """The hole as the coefficient of `i`, `j` or `1`."""
+    return _linear(_each_slot(unit, lambda slot: hole if slot == 1.0 else 0.0))
 
 
 def _swell(ring: Circular, factor: Linear) -> Circular:

@@ -79,8 +79,8 @@ def _read(found: Words, reading: HeaderReading, *, end: int) -> tuple[Tree, tupl
     outcome = read_program(lay_out(found))
     if not isinstance(outcome, Stopped):
         return plant(outcome, reading, end=end), ()
-    heads, problems = read_heads(found)
-    tree = plant(heads, reading, end=end) if heads else Tree(None, {}, ())
+    heads, problems, whole = read_heads(found)
+    tree = plant(heads, reading, end=end, whole=whole)
     if not problems and not tree.problems:
         problems = (explain_structure(outcome, found),)
     return tree, problems

@@ -8,8 +8,8 @@ import json
 from collections.abc import Mapping
 from typing import Literal
 
-from p3i.errors import ProgramError
 from p3i.grammar.ast import Affine, Coordinate, Draw, For, If, Polar, Program
+from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.header import header_lines
 from p3i.grammar.leaves import statements
 
@@ -21,7 +21,7 @@ _NO_HOLES: Mapping[str, str] = {}
 def format_program(program: Program, *, layout: Layout = "python") -> str:
     """The program's text, ending in a newline.
 
-    Raises ProgramError for layout "table1" where the program lies outside Table 1.
+    Raises ParseError for layout "table1" where the program lies outside Table 1: every place, as P301.
     """
     if layout == "python":
         return python_text(program)
@@ -29,7 +29,7 @@ def format_program(program: Program, *, layout: Layout = "python") -> str:
 
     left = departures(program)
     if left:
-        raise ProgramError(f"layout table1 holds programs of Table 1 only: {left[0].message}")
+        raise ParseError(left)
     return _table1_text(program)
 
 

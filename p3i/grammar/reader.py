@@ -62,7 +62,7 @@ def _feed(rule: str, tokens: Iterable[Token]) -> Any:
 
 
 def _stopped(problem: Any) -> Stopped:
-    """The facts in lark's exception, whose fields lark types in part only: `problem` is an UnexpectedInput."""
+    """The facts in an UnexpectedInput, whose fields lark types in part only."""
     if problem.__class__ is UnexpectedCharacters:
         return Stopped(Token("STRAY", problem.char, problem.pos_in_stream), frozenset())
     return Stopped(problem.token, frozenset(problem.accepts or problem.expected))

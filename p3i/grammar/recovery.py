@@ -29,22 +29,22 @@ class Piece:
     """Whether a `:` or `{` follows the head."""
 
 
-def read_heads(found: Words) -> tuple[tuple[Head, ...], tuple[Diagnostic, ...]]:
-    """The heads that can be read, and the problems of those that cannot.
-
-    Where a head is broken the list of heads is empty: what the rest means depends on it.
-    """
+def read_heads(found: Words) -> tuple[tuple[Head, ...], tuple[Diagnostic, ...], bool]:
+    """The heads that can be read, the problems of the others, and whether all could be read."""
     heads: list[Head] = []
     problems: list[Diagnostic] = []
+    whole = True
     for piece in pieces(found):
         first = piece.tokens[0]
         rule = HEAD_RULES.get(first.type)
         if rule is None:
             problems.append(_stranger(piece))
+            whole = False
             continue
         outcome = read_head(rule, piece.tokens)
         if isinstance(outcome, Stopped):
             problems.append(_explain(outcome, piece))
+            whole = False
             continue
         heads.append(outcome)
         if first.type in {"FOR", "IF"} and not piece.opened:
@@ -60,7 +60,7 @@ def read_heads(found: Words) -> tuple[tuple[Head, ...], tuple[Diagnostic, ...]]:
                     help="write `:` and indent the next line",
                 )
             )
-    return tuple(heads), tuple(problems)
+    return tuple(heads), tuple(problems), whole
 
 
 def pieces(found: Words) -> Iterator[Piece]:

@@ -150,3 +150,14 @@ def _columns(text: str) -> int:
         0 if unicodedata.combining(character) else 2 if unicodedata.east_asian_width(character) in "WF" else 1
         for character in text
     )
+
+
+def summary(*, errors: int, warnings: int, inputs: int) -> str:
+    """How many findings in how many files, in one line."""
+    parts = [_counted(errors, "error")] if errors else []
+    parts += [_counted(warnings, "warning")] if warnings else []
+    return f"{', '.join(parts) or 'nothing to report'} in {_counted(inputs, 'file')}"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

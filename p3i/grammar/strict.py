@@ -1,5 +1,6 @@
 """Strict mode: Table 1 to the letter (table1.lark), and where and how a program leaves it."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -115,6 +116,8 @@ def _misspelt(problem: Stopped, text: str, program: Program) -> Diagnostic:
     span = span_of(problem.token)
     if problem.token.type == "$END":
         span = Span(len(text.rstrip()), len(text.rstrip()) + 1)
+    elif word := re.compile(r"\w+").match(text, span.start):
+        span = Span(*word.span())
     production = _production_at(program, span.start)
     message = f"this is not spelt as in Table 1: `{PRODUCTIONS[production]}`"
     help = "`p3i fmt --layout table1` writes it so"

@@ -77,10 +77,13 @@ class Tree:
     problems: tuple[Diagnostic, ...]
 
 
-def plant(heads: Sequence[Head], reading: HeaderReading, *, end: int) -> Tree:
-    """Make the program of its heads, which come in the order of the text. `end` is the text's length."""
+def plant(heads: Sequence[Head], reading: HeaderReading, *, end: int, whole: bool = True) -> Tree:
+    """Make the program of its heads, which come in the order of the text. `end` is the text's length.
+
+    `whole` is false where some heads could not be read, so that what is missing proves nothing.
+    """
     planting = Planting()
-    chain = _chain(heads, planting, end=end)
+    chain = _chain(heads, planting, end=end, whole=whole)
     comments = _comments_by_head(heads, reading)
     camera = CameraPose(comments=tuple(comments[0]))
     statement: Statement | None = None
@@ -122,7 +125,7 @@ def plant(heads: Sequence[Head], reading: HeaderReading, *, end: int) -> Tree:
 _NOTHING = Draw(Affine(), Affine())
 
 
-def _chain(heads: Sequence[Head], planting: Planting, *, end: int) -> bool:
+def _chain(heads: Sequence[Head], planting: Planting, *, end: int, whole: bool) -> bool:
     """Whether the heads are a camera (or none), loops, guards and one draw, in this order."""
     before = len(planting.problems)
     nested = "a program is one camera, at most `for i` around `for j`, guards, and one Draw"
@@ -146,11 +149,11 @@ def _chain(heads: Sequence[Head], planting: Planting, *, end: int) -> bool:
                 )
             case _:
                 pass
-    if not draws:
+    if not draws and whole:
         span = heads[-1].span if heads else Span(end, end)
         message = "nothing is drawn: the program has no Draw" if heads else "the program is empty"
         planting.refuse("P111", message, span, help="write `Draw(x=10*i, y=10*j)` inside the loops")
-    return len(planting.problems) == before
+    return whole and len(planting.problems) == before
 
 
 def _comments_by_head(heads: Sequence[Head], reading: HeaderReading) -> list[list[str]]:
