@@ -15,7 +15,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
 from p3i.paint import outlines, scene
-from p3i.paint.options import KINDS, RenderOptions
+from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
 from p3i.paint.raster import paint
@@ -172,15 +172,6 @@ def overlay(
 ) -> RenderedPicture:
     """The photo with the program drawn over it; `render` with `image`, for callers who start at the photo."""
     return render(program, options, image=image, **changes)
-
-
-def kind_of(path: Path_) -> str:
-    """The kind of file that a name asks for; raises UsageError for one that is not drawn."""
-    suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in KINDS:
-        known = ", ".join(f".{kind}" for kind in KINDS)
-        raise UsageError(f"cannot tell the kind of picture from {fspath(path)!r}: end the name in {known}")
-    return suffix
 
 
 def _changed(options: RenderOptions, changes: dict[str, Any]) -> RenderOptions:

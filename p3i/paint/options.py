@@ -7,6 +7,8 @@ differ. Imports neither torch nor numpy: `p3i render --help` reads this file.
 import dataclasses
 import math
 from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 from p3i.errors import UsageError
@@ -64,3 +66,12 @@ def sentence(name: str) -> str:
 def default(name: str) -> Any:
     """The default of the field `name`; raises KeyError where there is no such field."""
     return {field.name: field.default for field in dataclasses.fields(RenderOptions)}[name]
+
+
+def kind_of(path: str | PathLike[str]) -> str:
+    """The kind of file that a name asks for; raises UsageError for one that is not drawn."""
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in KINDS:
+        known = ", ".join(f".{kind}" for kind in KINDS)
+        raise UsageError(f"cannot tell the kind of picture from {fspath(path)!r}: end the name in {known}")
+    return suffix
