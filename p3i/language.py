@@ -112,7 +112,8 @@ def verify_format(
 ) -> None:
     """Hold `text`, the format of `source` with these options, to the first two laws of the language.
 
-    Comments are held too, in their order. Raises FormatLawError where `text` means something else than `source`, or is no fixed point.
+    Comments are held too, in their order. Raises FormatLawError where `text` means something else than
+    `source`, or is no fixed point.
     """
     before, after = parse_sketch(source), parse_sketch(text)
     if isinstance(before, tuple) or isinstance(after, tuple) or not _same(before, after):

@@ -40,9 +40,8 @@ def command(file: str, form: str, error_format: str) -> int:
 def _text(points: list[Point]) -> str:
     rows = [("i", "j", "x", "y")] + [(str(i), str(j), f"{x:.6g}", f"{y:.6g}") for x, y, i, j in points]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "".join(
-        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) + "\n" for row in rows
-    )
+    lines = ("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(lines) + "\n"
 
 
 def _csv(points: list[Point]) -> str:

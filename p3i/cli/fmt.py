@@ -73,12 +73,7 @@ def command(
 
 def _diff(before: str, after: str, name: str) -> str:
     """A unified diff; a line without an end is marked as `diff` does."""
-    lines = difflib.unified_diff(
-        before.splitlines(keepends=True),
-        after.splitlines(keepends=True),
-        f"{name} (now)",
-        f"{name} (formatted)",
-    )
-    return "".join(
-        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines
-    )
+    old, new = before.splitlines(keepends=True), after.splitlines(keepends=True)
+    lines = difflib.unified_diff(old, new, f"{name} (now)", f"{name} (formatted)")
+    unended = "\n\\ No newline at end of file\n"
+    return "".join(line if line.endswith("\n") else line + unended for line in lines)

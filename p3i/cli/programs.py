@@ -18,7 +18,7 @@ STDIN = "-"
 
 
 def sources(words: Iterable[str], *, as_json: bool) -> Iterator[tuple[str, bytes] | P3IError]:
-    """Each input as (name, bytes), `-` being stdin; what cannot be read is reported and given as its error."""
+    """Each input as (name, bytes), `-` being stdin. What cannot be read is reported, and comes as its error."""
     for word in words:
         try:
             paths = [STDIN] if word == STDIN else [str(path) for path in gather([word], suffixes=SUFFIXES)]
@@ -41,7 +41,7 @@ def read(word: str) -> bytes:
 
 def stdin() -> bytes:
     """All of standard input."""
-    return click.get_binary_stream("stdin").read()
+    return sys.stdin.buffer.read()
 
 
 def shown(path: str) -> str:

@@ -10,7 +10,6 @@ It stands above the first statement. What it says becomes `Header`; unknown keys
 
 import json
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -111,6 +110,8 @@ def _read_toml(block: Sequence[Comment]) -> tuple[dict[str, Any], tuple[Diagnost
         if comment.text != "#" and not comment.text.startswith("# "):
             message = "a line of the header block starts with `# `"
             return {}, (error("P118", message, comment.span, help=_EXAMPLE),)
+    import tomllib  # few programs have a header, and it takes 5 ms to load
+
     try:
         return tomllib.loads("\n".join(comment.text[2:] for comment in block[1:-1]) + "\n"), ()
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as problem:

@@ -6,12 +6,13 @@ The rest of the package sees lark's tokens and no more of it.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedInput
 from lark.lark import PostLex
 
+from p3i.grammar import tables
 from p3i.grammar.heads import Head, HeadReader
 
 HEAD_RULES = {"CAMERA": "camera", "FOR": "for_head", "IF": "if_head", "DRAW": "draw"}
@@ -70,12 +71,20 @@ def _stopped(problem: Any) -> Stopped:
 
 @cache
 def _superset() -> Any:
-    """The reader of p3p.lark, a Lark, built once a process.
+    """The reader of p3p.lark, a Lark, made once a process: from its tables where they are fresh."""
+    grammar = grammar_text("p3p.lark")
+    return tables.load(grammar, transformer=HeadReader(), postlex=_KeepEverything()) or build_superset(
+        grammar
+    )
+
+
+def build_superset(grammar: str) -> Lark:
+    """The reader of p3p.lark from its text.
 
     Its callbacks run while it parses, so that there is neither a tree nor recursion.
     """
     return Lark(
-        _grammar("p3p.lark"),
+        grammar,
         parser="lalr",
         lexer="basic",
         start=["program", *HEAD_RULES.values()],
@@ -87,12 +96,13 @@ def _superset() -> Any:
 
 @cache
 def _table1() -> Any:
-    """The reader of table1.lark, a Lark, built once a process and only in strict mode."""
-    return Lark(_grammar("table1.lark"), parser="lalr", start="program")
+    """The reader of table1.lark, a Lark, made once a process and only in strict mode."""
+    return Lark(grammar_text("table1.lark"), parser="lalr", start="program")
 
 
-def _grammar(name: str) -> str:
-    return files("p3i.grammar").joinpath(name).read_text(encoding="utf-8")
+def grammar_text(name: str) -> str:
+    """The text of one of the two grammars, p3p.lark or table1.lark."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 class _KeepEverything(PostLex):
