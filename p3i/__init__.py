@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, loads
+    from p3i.paint.options import RenderOptions
     from p3i.search.config import SearchConfig
     from p3i.search.result import StopReason, SynthesisResult
 
@@ -29,6 +30,7 @@ _HOMES = {
     "P3IError": "p3i.errors",
     "Program": "p3i.grammar.ast",
     "ProgramError": "p3i.errors",
+    "RenderOptions": "p3i.paint.options",
     "SearchConfig": "p3i.search.config",
     "StopReason": "p3i.search.result",
     "SynthesisResult": "p3i.search.result",
@@ -49,7 +51,7 @@ _HOMES = {
 __all__ = [  # noqa: RUF022  # in the order of use
     "synth", "render", "score", "check", "format", "expand",
     "load", "loads", "dump", "dumps", "read_image",
-    "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason",
+    "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
 

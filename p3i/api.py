@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 from p3i.errors import UsageError
 from p3i.grammar.ast import Header, Program
 from p3i.language import check, dump, dumps, expand, format, load, loads
+from p3i.paint.options import RenderOptions
 from p3i.search.config import SearchConfig
 from p3i.search.result import SynthesisResult
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from p3i.paint.draw import RenderedPicture
     from p3i.search.score import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
@@ -98,11 +100,24 @@ def score(
     return evaluate(image, tree, config or SearchConfig())
 
 
-def render(*arguments: Any, **options: Any) -> Any:
-    """Draw a program; see p3i.paint.draw.render, whose arguments these are."""
+def render(
+    program: Program | str | os.PathLike[str],
+    options: RenderOptions | None = None,
+    *,
+    image: "str | os.PathLike[str] | Image | None" = None,
+    sprite: "str | os.PathLike[str] | Image | None" = None,
+    beside: str | os.PathLike[str] | None = None,
+    **changes: Any,
+) -> "RenderedPicture":
+    """Draw `program`, alone or over the photo `image`; `changes` are fields of RenderOptions.
+
+    `sprite` is a picture for every object; pictures named in the program are looked up beside its file, or
+    in the folder `beside`. The result has `pixels()`, `encode(kind)` and `save(path)`.
+    Raises FileError, ParseError and UsageError, as p3i.paint.draw.render, which draws.
+    """
     from p3i.paint.draw import render as draw
 
-    return draw(*arguments, **options)
+    return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
 
 
 def _without(

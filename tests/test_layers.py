@@ -33,7 +33,13 @@ HEAVY = {"torch", "torchvision", "numpy", "cv2", "PIL", "scipy", "rich"}
 GRAMMAR_MAY_IMPORT = {"lark"}
 # Files that must be importable without any heavy package: what `--help`, `check`, `fmt` and `expand` load.
 LIGHT = ["p3i", "p3i.api", "p3i.language", "p3i.cli", "p3i.grammar", *sorted(LEAVES)]
-LIGHT += ["p3i.search.config", "p3i.search.result", "p3i.search.record", "p3i.interp.unroll"]
+LIGHT += [
+    "p3i.search.config",
+    "p3i.search.result",
+    "p3i.search.record",
+    "p3i.interp.unroll",
+    "p3i.paint.options",
+]
 # Packages whose own file must be empty of imports, since importing any part of them runs it.
 BARE = ["p3i.cli", "p3i.grammar", "p3i.interp", "p3i.search", "p3i.vision", "p3i.paint"]
 
