@@ -18,7 +18,7 @@ STDIN = "-"
 
 
 def sources(words: Iterable[str], *, as_json: bool) -> Iterator[tuple[str, bytes] | P3IError]:
-    """Each input as (name, bytes), `-` being stdin. What cannot be read is reported, and comes as its error."""
+    """Each input as (name, bytes), `-` is stdin. What cannot be read is reported, and given as its error."""
     for word in words:
         try:
             paths = [STDIN] if word == STDIN else [str(path) for path in gather([word], suffixes=SUFFIXES)]

@@ -25,9 +25,9 @@ def load(grammar: str, **options: Any) -> lark.Lark | None:
         return None
     if stored.get("key") != key(grammar):
         return None
+    parser_class: Any = lark.Lark
     # what the standalone parsers that lark generates call
-    make: Any = lark.Lark._load_from_dict  # pyright: ignore[reportPrivateUsage]
-    return make(stored["data"], stored["memo"], **options)
+    return parser_class._load_from_dict(stored["data"], stored["memo"], **options)
 
 
 def save(grammar: str, parser: Any) -> None:
@@ -35,10 +35,8 @@ def save(grammar: str, parser: Any) -> None:
     data, memo = parser.memo_serialize([TerminalDef, Rule])
     # what the options hold besides plain values is given again on loading
     data["options"] = {name: value for name, value in data["options"].items() if _is_plain(value)}
-    text = json.dumps(
-        {"key": key(grammar), "data": data, "memo": memo}, separators=(",", ":"), sort_keys=True
-    )
-    FILE.write_text(text + "\n", encoding="utf-8")
+    stored = {"key": key(grammar), "data": data, "memo": memo}
+    FILE.write_text(json.dumps(stored, separators=(",", ":"), sort_keys=True) + "\n", encoding="utf-8")
 
 
 def key(grammar: str) -> str:
