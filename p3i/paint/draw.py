@@ -37,8 +37,8 @@ from p3i.vision.write import encode, write_bytes
 Path_ = str | PathLike[str]
 FocalSource = Literal["option", "header", "exif", "default"]
 
-_DOT_SHARE = 0.2
-"""A dot's radius as a share of the spacing."""
+_DOT_SHARE, _PHOTO_DOT_SHARE = 0.2, 0.11
+"""A dot's radius as a share of the spacing; over a photo it should leave the object to be seen."""
 
 _SPRITE_SHARE = 0.9
 """A sprite's longer side as a share of the spacing."""
@@ -151,7 +151,7 @@ def render(
     if options.markers if options.markers is not None else pictures is None:
         loops = sum(loop is not None for loop in (nest(program).for_i, nest(program).for_j))
         colours = scene.colours_of(index, loops=loops)
-        radius = _DOT_SHARE * spacing
+        radius = (_DOT_SHARE if photo is None else _PHOTO_DOT_SHARE) * spacing
         layers.append(scene.dots(view, objects, radius=radius, colours=colours, light_rim=photo is not None))
     see_through = layers and isinstance(layers[0], scene.Pixels) and layers[0].values.shape[2] == 4
     paper = None if photo is not None and see_through else scene.WHITE

@@ -66,7 +66,7 @@ def _line_coverage(segments: np.ndarray, width: float, size: Size) -> np.ndarray
     fine = np.zeros((size.height * _FINE, size.width * _FINE), np.uint8)
     # Pixel centres at whole numbers, here and in the finer picture.
     ends = np.rint(((segments + 0.5) * _FINE - 0.5) * 2**_SHIFT).astype(np.int32)
-    thickness = max(1, round(width * _FINE))
+    thickness = max(1, round(width * _FINE) - 1)  # OpenCV paints one pixel more than it is told
     cv2.polylines(fine, list(ends[:, :, None, :]), False, 255, thickness, cv2.LINE_8, _SHIFT)
     return _reduced(fine)
 

@@ -79,14 +79,10 @@ def _placed(
     width, height = (units * side / sprite.size.longer for side in (sprite.size.width, sprite.size.height))
     around = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) * (width, height)
     outline, depth = view.project(point + around)
-    canvas = np.array([view.size.width, view.size.height])
-    if (depth > 0).all():
-        low = np.clip(np.floor(outline.min(axis=0)) - 1, 0, canvas).astype(int)
-        high = np.clip(np.ceil(outline.max(axis=0)) + 2, 0, canvas).astype(int)
-    else:  # it reaches behind the camera, and so across the edge of the canvas
-        low, high = np.zeros(2, int), canvas
-    if (low >= high).any():
+    bounds = _bounds(view, outline, point + around)
+    if bounds is None:
         return None
+    low, high = bounds
     region = Size(*(high - low).tolist())
     level = _level(view, sprite, point, units)
     source = np.pad(sprite.levels[level], ((1, 1), (1, 1), (0, 0)))  # transparent all around
@@ -107,6 +103,25 @@ def _placed(
         piece = piece * in_front(plane_from_canvas @ canvas_from_fine, fine)[:, :, None]
     piece = cv2.resize(piece, (region.width, region.height), interpolation=cv2.INTER_AREA)
     return slice(low[1], high[1]), slice(low[0], high[0]), piece
+
+
+def _bounds(view: View, outline: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """The rectangle of the canvas that a sprite may cover: first pixel and end; None if there is none."""
+    canvas = np.array([view.size.width, view.size.height])
+    if not np.isfinite(outline).all():  # it reaches behind the camera: what is left ends at the canvas
+        seen = view.project_segments(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)).reshape(-1, 2)
+        edge = canvas - 1.0
+        frame = np.array([(0, 0), (edge[0], 0), edge, (0, edge[1])])
+        plane = np.concatenate([frame, np.ones((4, 1))], axis=1) @ np.linalg.inv(view.canvas_from_plane).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            plane = plane[:, :2] / np.where(plane[:, 2:] > 0, plane[:, 2:], np.nan)
+        inside = ((plane >= corners.min(axis=0)) & (plane <= corners.max(axis=0))).all(axis=1)
+        outline = np.concatenate([seen, frame[inside]])
+        if not len(outline):
+            return None
+    low = np.clip(np.floor(outline.min(axis=0)) - 1, 0, canvas).astype(int)
+    high = np.clip(np.ceil(outline.max(axis=0)) + 2, 0, canvas).astype(int)
+    return None if (low >= high).any() else (low, high)
 
 
 def in_front(plane_from_canvas: np.ndarray, size: Size) -> np.ndarray:
