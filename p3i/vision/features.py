@@ -84,7 +84,7 @@ def extract(
     name: str = DEFAULT,
     longer: int | None = None,
     weights: Path | None = None,
-    channels: int = 6,
+    channels: int = 4,
 ) -> FeatureMap:
     """The features of a photo, normalised locally, with mean energy 1.
 
