@@ -65,9 +65,16 @@ def _line_coverage(segments: np.ndarray, width: float, size: Size) -> np.ndarray
     """How much of each pixel lies under lines: float32 [H, W] in 0..1."""
     fine = np.zeros((size.height * _FINE, size.width * _FINE), np.uint8)
     # Pixel centres at whole numbers, here and in the finer picture.
-    ends = np.rint(((segments + 0.5) * _FINE - 0.5) * 2**_SHIFT).astype(np.int32)
-    thickness = max(1, round(width * _FINE) - 1)  # OpenCV paints one pixel more than it is told
-    cv2.polylines(fine, list(ends[:, :, None, :]), False, 255, thickness, cv2.LINE_8, _SHIFT)
+    ends = (segments + 0.5) * _FINE - 0.5
+    along = ends[:, 1] - ends[:, 0]
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    # OpenCV fills a polygon's edge too, half a pixel more on each side.
+    along = along * max(0.0, width * _FINE - 1) / 2
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    first, last = ends[:, 0] - along, ends[:, 1] + along
+    outline = np.stack([first - across, last - across, last + across, first + across], axis=1)
+    for quad in np.rint(outline * 2**_SHIFT).astype(np.int32):
+        cv2.fillConvexPoly(fine, quad, 255, cv2.LINE_8, _SHIFT)
     return _reduced(fine)
 
 
