@@ -76,3 +76,15 @@ def test_every_example_is_canonical_and_has_no_findings(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert list(p3i.check(text)) == []
     assert p3i.format(p3i.loads(text)) == text
+
+
+def test_the_readme_runs_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    pytest.importorskip("p3i.search.synthesize")
+    blocks = re.findall(r"^```python\n(.*?)^```", TEXT[ROOT / "README.md"], flags=re.MULTILINE | re.DOTALL)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert "SetCameraPose" in printed
+    assert (tmp_path / "rings.svg").exists()
