@@ -153,7 +153,7 @@ def _unit_range(array: np.ndarray) -> tuple[np.ndarray, np.ndarray, str | None]:
     """Any numbers [H, W, C] -> float32 in 0..1, which pixels [H, W] are finite, a note if stretched."""
     if array.dtype in (np.uint8, np.uint16):
         scale = np.float32(1 / np.iinfo(array.dtype).max)
-        return array.astype(np.float32) * scale, np.ones(array.shape[:2], bool), None
+        return np.multiply(array, scale, dtype=np.float32), np.ones(array.shape[:2], bool), None
     if array.dtype == np.bool_:
         return array.astype(np.float32), np.ones(array.shape[:2], bool), None
     values = array.astype(np.float64)

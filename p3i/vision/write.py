@@ -167,7 +167,8 @@ def read_png_text(data: bytes) -> dict[str, str]:
         if kind == b"tEXt":
             found[keyword.decode("latin-1")] = rest.decode("latin-1")
         elif kind == b"iTXt" and rest[:2] == b"\0\0":  # not compressed, as p3i writes it
-            _, _, value = rest[2:].split(b"\0", 2)
+            after_language = rest[2:].partition(b"\0")[2]
+            value = after_language.partition(b"\0")[2]
             found[keyword.decode("latin-1")] = value.decode("utf-8", errors="replace")
     return found
 

@@ -107,7 +107,15 @@ def test_text_is_found_in_a_png_of_another_writer(tmp_path, pixels):
     info.add_text("p3i", "latin é")
     Pil.fromarray((pixels * 255).astype(np.uint8)).save(tmp_path / "a.png", pnginfo=info)
     assert read_png_text((tmp_path / "a.png").read_bytes()) == {"p3i": "latin é"}
-    assert read_png_text((tmp_path / "a.png").read_bytes()[:50]) is not None
+
+
+def test_text_is_looked_for_in_damaged_files_without_an_error(pixels):
+    data = encode(pixels, kind=".png", text={"p3i": "SetCameraPose(rx=1, ry=2)"})
+    start = data.index(b"iTXt")
+    for length in range(0, start + 60):
+        assert set(read_png_text(data[:length])) <= {"p3i", "p3", "p", ""}
+    for at in range(start, start + 20):
+        assert isinstance(read_png_text(data[:at] + b"\1" + data[at + 1 :]), dict)
 
 
 def test_values_beyond_the_range_are_clipped_and_nan_is_black(tmp_path):
