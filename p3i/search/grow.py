@@ -25,6 +25,8 @@ from p3i.search.lattice import (
     map_from_index,
 )
 from p3i.search.propose.lattice import Proposal, tilted
+from p3i.search.refine import refine
+from p3i.search.register import find_instances, fit_instances
 
 # A cell belongs to the pattern where the others predict it this much better than at half steps; the same
 # figure is taken off before cells are summed, so that many doubtful cells make no pattern.
@@ -35,6 +37,8 @@ _ROUNDS = 9
 _SAMPLES = 6
 # More cells than this are not needed for one step of the refinement.
 _MOST_REFINED = 160
+# An instance counts where its peak beats the rim of the search by this much.
+_LEAST_LEAD = 0.05
 # The tilts under which a proposal without one is tried.
 _TILTS_DEG = (0.0, 35.0, 55.0)
 _FEWEST = 4
@@ -79,41 +83,52 @@ def measure(
 
 def grow(evidence: Evidence, pattern: Pattern, proposal: Proposal, *, generator: torch.Generator) -> Fit | None:
     """Refine a proposal and follow it as far as the pattern goes; None where there is nothing to follow."""
-    from p3i.search.refine import refine
-
     start = _seed(evidence, pattern, proposal)
     if start is None:
         return None
     theta, selected, weights = start
     level = evidence.level_for(_cell(evidence, pattern, theta))
+    theta = refine(
+        level, pattern, theta, index=selected, weights=weights, fixed=PHASE, samples=_SAMPLES
+    )
+    return follow(evidence, pattern, theta, selected, generator=generator, rounds=_ROUNDS)
+
+
+def follow(
+    evidence: Evidence,
+    pattern: Pattern,
+    theta: Tensor,
+    selected: Tensor,
+    *,
+    generator: torch.Generator,
+    rounds: int,
+    finest: bool = False,
+) -> Fit | None:
+    """Find the instances around the `selected` cells, fit theta to them, take in the cells beyond; repeat."""
     best: Fit | None = None
     previous: set[tuple[float, ...]] = set()
-    for turn in range(_ROUNDS):
-        few = _sample_of(len(selected), generator)
-        theta = refine(
-            level,
-            pattern,
-            theta,
-            index=selected[few],
-            weights=weights[few],
-            fixed=PHASE,
-            samples=_SAMPLES,
-        )
+    for turn in range(rounds):
         if not _sane(pattern, theta):
             break
-        level = evidence.level_for(_cell(evidence, pattern, theta))
+        level = evidence.level_for(_cell(evidence, pattern, theta), finest=finest)
         fit = measure(level, pattern, theta, start=selected)
         if fit is None:
             break
         if best is None or fit.score > best.score:
             best = fit
         selected, weights = _grown(fit, selected)
-        if len(selected) < _FEWEST:
-            break
         now = {tuple(cell) for cell in selected.tolist()}
-        if turn >= 3 and len(now ^ previous) <= 0.05 * len(now):
+        if len(now) < _FEWEST or (turn >= 2 and len(now ^ previous) <= 0.04 * len(now)):
             break
         previous = now
+        few = _sample_of(len(selected), generator)
+        found = find_instances(
+            level, pattern, theta, selected[few], torch.where(weights > SUPPORT, weights, 0.0)[few]
+        )
+        certain = found.peak.clamp(min=0) * (found.lead > _LEAST_LEAD)
+        if int((certain > 0).sum()) < _FEWEST:
+            break
+        theta = fit_instances(level, pattern, theta, found, weights=certain.double())
     return best
 
 

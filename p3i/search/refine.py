@@ -49,8 +49,10 @@ def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = fro
             limit = _MOST_TURN_DEG
         else:
             variable = path.rsplit(".", 1)[1]
-            kin = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] == variable]
-            limit = _MOST_CHANGE * max(*kin, 1e-3) if len(kin) > 1 else _MOST_CHANGE * max(kin[0], 1e-3)
+            # A constant may move as far as the loops' own steps.
+            alike = ("i", "j") if variable == "1" else (variable,)
+            steps = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] in alike]
+            limit = _MOST_CHANGE * max(*steps, 1e-3, 0.0)
         places.append(place)
         limits.append(limit)
     return FreeNumbers(tuple(places), tuple(limits))

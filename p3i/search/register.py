@@ -1,0 +1,150 @@
+"""Instances: where each object really lies, by correlation with the mean cell, and the fit to those places.
+
+Gauss-Newton on features sees as far as their blur. Searching each cell's surroundings for the mean cell sees
+a third of a cell, tells a cell that is there from one that is not, and leaves a small robust least-squares
+problem in the program's numbers, which the compiled generator solves for any sketch.
+"""
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from p3i.interp.pattern import Pattern
+from p3i.search.cells import mean_cell, read_cells, sample_points
+from p3i.search.evidence import Level
+from p3i.search.refine import free_numbers
+
+# Samples along a cell's side, and how many of them the search reaches to each side (a third of a cell).
+_SIDE = 12
+_REACH = 4
+# An offset is known to about this share of a cell, and no better than this many map pixels.
+_SHARE_NOISE = 0.02
+_PIXEL_NOISE = 0.25
+# Offsets beyond this many of those count less and less (a Cauchy weight).
+_ROBUST_SCALE = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Instances:
+    """What correlation with the mean cell says of each cell, N of them.
+
+    `offsets` [N, 2]: where the object lies, in index units from where the program puts it. `peak` [N]: the
+    agreement with the mean cell there; `lead` [N]: by how much that beats the best at the search's rim.
+    """
+
+    index: Tensor
+    offsets: Tensor
+    peak: Tensor
+    lead: Tensor
+
+
+def find_instances(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, weights: Tensor) -> Instances:
+    """Search around each cell of `index` [N, 2] for the mean cell; `weights` [N] make that mean.
+
+    A cell takes no part in the mean that it is compared with.
+    """
+    wide = _SIDE + 2 * _REACH
+    steps = (torch.arange(wide, dtype=torch.float64) - (wide - 1) / 2) / _SIDE
+    cells = read_cells(level, pattern, theta, index, torch.cartesian_prod(steps, steps))
+    planes = cells.values.reshape(len(index), wide, wide, -1).permute(0, 3, 1, 2)  # [N, C, a, b]
+    known = cells.known.reshape(len(index), 1, wide, wide).float()
+    middle = slice(_REACH, _REACH + _SIDE)
+    own = planes[:, :, middle, middle]
+    own_known = known[:, :, middle, middle]
+    weight = own_known * weights.float()[:, None, None, None]
+    total = weight.sum(0, keepdim=True)
+    mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
+    shape = (1, len(index) * planes.shape[1], wide, wide)
+    # Grouped correlation: each cell with the mean of the others.
+    rest = (total - weight).clamp(min=1e-6)
+    others = (mean * total - weight * own) / rest
+    others = torch.where(total - weight > 1e-3, others, mean)
+    kernel = others.reshape(-1, 1, _SIDE, _SIDE)
+    inner = F.conv2d(planes.reshape(shape), kernel, groups=kernel.shape[0])
+    inner = inner.reshape(len(index), planes.shape[1], *inner.shape[-2:]).sum(1)
+    energy = F.conv2d(planes.square().sum(1, keepdim=True), torch.ones(1, 1, _SIDE, _SIDE))[:, 0]
+    squared = others.square().sum(1)
+    of_mean = F.conv2d(known.reshape(1, len(index), wide, wide), squared[:, None], groups=len(index))[0]
+    value = 2 * inner / (energy + of_mean).clamp(min=1e-6)
+    return _peaks(index, value)
+
+
+def _peaks(index: Tensor, value: Tensor) -> Instances:
+    """The best place of each cell in its table of agreements [N, S, S], finer than the samples."""
+    count, side, _ = value.shape
+    flat = value.reshape(count, -1)
+    peak, place = flat.max(1)
+    row, column = place // side, place % side
+    inside = (row > 0) & (row < side - 1) & (column > 0) & (column < side - 1)
+    r, c = row.clamp(1, side - 2), column.clamp(1, side - 2)
+    each = torch.arange(count)
+
+    def vertex(before: Tensor, at: Tensor, after: Tensor) -> Tensor:
+        bend = before - 2 * at + after
+        return torch.where(bend < -1e-6, 0.5 * (before - after) / bend.clamp(max=-1e-6), 0).clamp(-0.5, 0.5)
+
+    at = value[each, r, c]
+    fine_a = vertex(value[each, r - 1, c], at, value[each, r + 1, c])
+    fine_b = vertex(value[each, r, c - 1], at, value[each, r, c + 1])
+    offsets = torch.stack([row + fine_a, column + fine_b], 1).double() - (side - 1) / 2
+    rim = torch.ones(side, side, dtype=torch.bool)
+    rim[1:-1, 1:-1] = False
+    lead = torch.where(inside, peak - value[:, rim].amax(1), 0.0)
+    return Instances(index, offsets / _SIDE, peak, lead)
+
+
+def fit_instances(
+    level: Level,
+    pattern: Pattern,
+    theta: Tensor,
+    found: Instances,
+    *,
+    weights: Tensor,
+    fixed: frozenset[str] = frozenset(),
+    iterations: int = 8,
+) -> Tensor:
+    """Move theta [P] so that the program's points fall on the instances; robust against strays.
+
+    Offsets are compared in index units, so that near and far objects count alike.
+    """
+    free = free_numbers(pattern, theta, fixed=fixed)
+    places, limits = torch.tensor(free.places), torch.tensor(free.limits, dtype=torch.float64)
+    targets, _ = sample_points(level, pattern, theta, found.index + found.offsets)
+    inverse, cell = _index_from_map(level, pattern, theta, found.index)
+    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()
+
+    def points_of(moving: Tensor, base: Tensor) -> tuple[Tensor, Tensor]:
+        points, _ = sample_points(level, pattern, base.index_put((places,), moving), found.index)
+        return points, points.detach()
+
+    for _ in range(iterations):
+        jacobian, points = torch.func.jacfwd(points_of, has_aux=True)(theta[places], theta)
+        residual = torch.einsum("nij,nj->ni", inverse, points - targets) / noise[:, None]
+        rows = torch.einsum("nij,njp->nip", inverse, jacobian * limits) / noise[:, None, None]
+        distance = residual.square().sum(1)
+        weight = (weights / (1 + distance / _ROBUST_SCALE**2)).sqrt()
+        a = (rows * weight[:, None, None]).reshape(-1, len(places))
+        b = (residual * weight[:, None]).reshape(-1)
+        normal = a.T @ a
+        step = -torch.linalg.solve(normal + 1e-6 * torch.diag(normal.diagonal() + 1e-9), a.T @ b)
+        if not bool(torch.isfinite(step).all()):
+            break
+        worst = float(step.abs().max())
+        theta = theta.index_put((places,), theta[places] + step * limits / max(1.0, worst))
+        if worst < 1e-4:
+            break
+    return theta
+
+
+def _index_from_map(level: Level, pattern: Pattern, theta: Tensor, index: Tensor) -> tuple[Tensor, Tensor]:
+    """How index moves with map pixels at each cell [N, 2, 2], and the cell's side in map pixels [N]."""
+    half = 0.25
+    columns = []
+    for step in torch.eye(2, dtype=torch.float64) * half:
+        ahead, _ = sample_points(level, pattern, theta, index + step)
+        behind, _ = sample_points(level, pattern, theta, index - step)
+        columns.append((ahead - behind) / (2 * half))
+    matrix = torch.stack(columns, dim=2)
+    return torch.linalg.inv(matrix), torch.linalg.det(matrix).abs().sqrt()
