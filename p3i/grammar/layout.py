@@ -99,11 +99,15 @@ def lay_out(found: Words) -> Iterator[Token]:
     """
     levels: list[int] = []
     depth = 0
+    before: Token | None = None
     for position, token in enumerate(found.tokens):
         indent = found.indents.get(position)
         if indent is not None and depth == 0:
-            if not levels:
+            if before is None:
                 levels.append(indent)  # a program may be indented as a whole
+            elif _goes_on(before, token):
+                if before.type == "SEMICOLON" and len(levels) == 1:
+                    levels = [indent]
             else:
                 yield _mark("_NL", token)
                 while indent < levels[-1] and len(levels) > 1:
@@ -113,13 +117,27 @@ def lay_out(found: Words) -> Iterator[Token]:
                     levels.append(indent)
                     yield _mark("_INDENT", token)
         depth = max(0, depth + (token.type in OPENING) - (token.type in CLOSING))
+        before = token
         yield token
-    if found.tokens:
-        end = found.tokens[-1].update(type="_NL", value="")
-        end.start_pos = span_of(found.tokens[-1]).end
+    if before is not None:
+        end = before.update(type="_NL", value="")
+        end.start_pos = span_of(before).end
         yield end
         for _ in levels[1:]:
             yield _mark("_DEDENT", end)
+
+
+def _goes_on(before: Token, after: Token) -> bool:
+    """Whether a line end between two words means nothing, as everywhere in Table 1.
+
+    It does where the first cannot end a statement, or the second cannot begin one.
+    """
+    return before.type in {"CAMERA", "FOR", "IF", "DRAW", "SEMICOLON"} or after.type in {
+        "LPAR",
+        "LBRACE",
+        "RBRACE",
+        "SEMICOLON",
+    }
 
 
 def _mark(type: str, at: Token) -> Token:
