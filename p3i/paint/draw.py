@@ -145,7 +145,7 @@ def render(
         layers += scene.grid(view, segments, over_photo=not bare)
     if pictures is not None:
         units = options.sprite_units or _SPRITE_SHARE * spacing
-        layers.append(scene.Pixels(lay(view, sprite_of(pictures), objects, units=units)))
+        layers.append(scene.Pixels(lay(view, [sprite_of(pictures)], objects, units=units)))
     if options.horizon:
         layers += scene.horizon(view, over_photo=photo is not None)
     if options.markers if options.markers is not None else pictures is None:

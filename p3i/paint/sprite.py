@@ -4,6 +4,7 @@ Convention: sprites are RGBA float32 [h, w, 4] in 0..1, premultiplied by alpha, 
 mix no colour of transparent pixels in. A sprite's rectangle is centred on its object, upright on the plane.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -53,17 +54,17 @@ def plain(layer: np.ndarray) -> np.ndarray:
     return np.rint(255 * np.clip(np.concatenate([colour, alpha], axis=2), 0, 1)).astype(np.uint8)
 
 
-def lay(view: View, sprite: Sprite, points: np.ndarray, *, units: float) -> np.ndarray:
-    """The layer of a sprite at each of the plane's `points` [M, 2]: uint8 [H, W, 4], plain alpha.
+def lay(view: View, sprites: Sequence[Sprite], points: np.ndarray, *, units: float) -> np.ndarray:
+    """The layer of sprites at the plane's `points` [M, 2]: uint8 [H, W, 4], plain alpha.
 
-    `units` is the longer side of the sprite on the plane. Later points stand before earlier ones at equal
-    depth; the far ones are painted first.
+    The sprites are taken in turn. `units` is the longer side of a sprite on the plane. Later points stand
+    before earlier ones at equal depth; the far ones are painted first.
     """
     layer = np.zeros((view.size.height, view.size.width, 4), np.float32)
     _, depth = view.project(points)
     order = [k for k in np.argsort(-depth, kind="stable").tolist() if depth[k] > 1e-3 * view.depth_unit]
     for k in order:
-        placed = _placed(view, sprite, points[k], units)
+        placed = _placed(view, sprites[k % len(sprites)], points[k], units)
         if placed is not None:
             rows, columns, piece = placed
             window = layer[rows, columns]
