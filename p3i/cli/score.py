@@ -22,7 +22,13 @@ from p3i.search.config import SearchConfig, default, sentence
     show_default=True,
     help="How to print the numbers.",
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@click.option(
+    "--focal",
+    "focal_mm",
+    type=float,
+    metavar="MM",
+    help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
+)
 @click.option(
     "--features",
     metavar="NAME",

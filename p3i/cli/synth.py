@@ -37,7 +37,13 @@ from p3i.search.result import StopReason, SynthesisResult
     show_default=True,
     help=sentence("structure"),
 )
-@click.option("--extent", type=click.Choice(EXTENTS), default=default("extent"), help=sentence("extent"))
+@click.option(
+    "--extent",
+    type=click.Choice(EXTENTS),
+    default=default("extent"),
+    show_default=True,
+    help=sentence("extent"),
+)
 @click.option("--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown.")
 @click.option(
     "--roi",
@@ -55,7 +61,7 @@ from p3i.search.result import StopReason, SynthesisResult
 @click.option("--weights", type=click.Path(), metavar="FILE", help=sentence("weights"))
 @click.option("--strict", is_flag=True, help=sentence("strict"))
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@click.option("--top", type=int, metavar="K", default=default("top"), help=sentence("top"))
+@click.option("--top", type=int, metavar="K", default=default("top"), show_default=True, help=sentence("top"))
 @click.option("--seed", type=int, default=default("seed"), show_default=True, help=sentence("seed"))
 @click.option("--device", default=default("device"), show_default=True, help=sentence("device"))
 @click.option("--threads", type=int, default=default("threads"), show_default=True, help=sentence("threads"))
