@@ -1,5 +1,6 @@
 """Pictures -> files: whole or not at all, and never over something that is there."""
 
+import errno
 import io
 import os
 import struct
@@ -71,42 +72,48 @@ def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = Fals
         sys.stdout.buffer.flush()
         return
     target = Path(path)
-    if target.is_dir():
-        raise FileError(f"{target} is a folder: name a file in it")
-    if target.exists() and not target.is_file():
-        # A device or a pipe (/dev/null): there is nothing to replace, and renaming over it would destroy it.
-        try:
-            target.write_bytes(data)
-        except OSError as error:
-            raise FileError(f"{target} cannot be written: {error.strerror}") from None
-        return
-    beside: Path | None = None
     try:
-        place = target.resolve()  # through a link, so that the link stays one
-        if not force and place.exists():
-            raise FileError(f"{target} exists already: name another file, or say --force")
-        handle, name = tempfile.mkstemp(prefix=f".{place.name[:100]}.", dir=place.parent)
-        beside = Path(name)
+        if target.is_dir():
+            raise FileError(f"{target} is a folder: name a file in it")
+        if target.exists() and not target.is_file():
+            # A device or a pipe (/dev/null): there is nothing to replace, and a rename would destroy it.
+            target.write_bytes(data)
+        else:
+            _write_beside_and_rename(target, data, force=force)
+    except FileNotFoundError:
+        raise FileError(f"there is no folder {target.parent} to write {target.name} into") from None
+    except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise FileError(f"{target} cannot be written: {reason or error}") from None
+
+
+def _write_beside_and_rename(target: Path, data: bytes, *, force: bool) -> None:
+    """Write a file in one step; FileError where it exists (without `force`), OSError as the system says."""
+    place = target.resolve()  # through a link, so that the link stays one
+    if not force and place.exists():
+        raise FileError(f"{target} exists already: name another file, or say --force")
+    handle, name = tempfile.mkstemp(prefix=f".{place.name[:40]}.", dir=place.parent)
+    beside = Path(name)
+    try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
         beside.chmod(_mode_of(place))
         if force:
             beside.replace(place)
-        else:
-            # A link fails where a file has appeared since: renaming would replace it.
-            try:
-                os.link(beside, place)
-            except FileExistsError:
-                raise FileError(f"{target} exists already: name another file, or say --force") from None
-            except OSError:  # file systems without hard links
-                beside.replace(place)
-    except FileNotFoundError:
-        raise FileError(f"there is no folder {target.parent} to write {target.name} into") from None
-    except OSError as error:
-        raise FileError(f"{target} cannot be written: {error.strerror or error}") from None
+            return
+        # A link fails where a file has appeared since; a rename would replace it.
+        try:
+            os.link(beside, place)
+        except FileExistsError:
+            raise FileError(f"{target} exists already: name another file, or say --force") from None
+        except PermissionError:  # file systems without hard links say so
+            beside.replace(place)
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
+                raise
+            beside.replace(place)
     finally:
-        if beside is not None:
-            beside.unlink(missing_ok=True)
+        beside.unlink(missing_ok=True)
 
 
 def encode(

@@ -176,9 +176,21 @@ def test_a_failure_leaves_neither_a_part_nor_a_loss(tmp_path, monkeypatch, force
 def test_places_that_cannot_be_written_are_named(tmp_path, pixels):
     with pytest.raises(FileError, match=r"no folder .*missing"):
         write_image(tmp_path / "missing" / "a.png", pixels)
+    for name in ("a" * 300 + ".png", "nul\0.png"):
+        with pytest.raises(FileError, match="cannot be written"):
+            write_image(tmp_path / name, pixels)
     (tmp_path / "b.png").mkdir()
     with pytest.raises(FileError, match="is a folder"):
         write_image(tmp_path / "b.png", pixels, force=True)
+
+
+def test_file_systems_without_hard_links_are_written_to(tmp_path, monkeypatch):
+    def no_links(source, target):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", no_links)
+    write_bytes(tmp_path / "a", b"1")
+    assert [(entry.name, entry.read_bytes()) for entry in tmp_path.iterdir()] == [("a", b"1")]
 
 
 def test_new_files_get_the_usual_permissions_and_old_ones_keep_theirs(tmp_path):
