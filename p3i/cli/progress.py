@@ -4,32 +4,33 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-Update = Callable[[str, float], None]
-
 
 @contextmanager
-def bar(*, wanted: bool, total: int) -> Iterator[Callable[[str, int], Update]]:
-    """A bar over `total` photos; yields `start(label, number) -> update(stage, fraction)`.
+def bar(label: str, *, wanted: bool) -> Iterator[Callable[[str, float], None]]:
+    """A bar for one photo; yields `update(stage, fraction)`.
 
     Draws nothing, and does not import rich, unless it is wanted and stderr is a terminal. It vanishes at
-    the end, so that what stays on the screen is the result.
+    the end, before the answer is printed.
     """
     if not (wanted and sys.stderr.isatty()):
-        yield lambda _label, _number: lambda _stage, _fraction: None
+        yield lambda _stage, _fraction: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task("", total=float(total))
+    # rich would send what is printed meanwhile to its own console, which is stderr.
+    shown = Progress(
+        *columns,
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with shown:
+        task = shown.add_task(f"{label}: reading", total=1.0)
 
-        def start(label: str, number: int) -> Update:
-            def update(stage: str, fraction: float) -> None:
-                done = number + min(max(fraction, 0.0), 1.0)
-                shown.update(task, completed=done, description=f"{label}: {stage}")
+        def update(stage: str, fraction: float) -> None:
+            shown.update(task, completed=min(max(fraction, 0.0), 1.0), description=f"{label}: {stage}")
 
-            update("reading", 0.0)
-            return update
-
-        yield start
+        yield update

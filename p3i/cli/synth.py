@@ -160,10 +160,10 @@ def run(call: Call) -> int:
             lines = open_files.enter_context(files.replacing(call.output, force=call.force))
         if call.trace is not None:
             trace = open_files.enter_context(files.replacing(call.trace, force=call.force))
-        start = open_files.enter_context(progress.bar(wanted=not call.quiet, total=len(call.photos)))
         for number, (photo, target) in enumerate(zip(call.photos, targets, strict=True)):
             label = photo.name if len(call.photos) == 1 else f"{number + 1}/{len(call.photos)} {photo.name}"
-            outcome = _solve(call, photo, target, update=start(label, number), trace=trace)
+            with progress.bar(label, wanted=not call.quiet) as update:
+                outcome = _solve(call, photo, target, update=update, trace=trace)
             _write(call, outcome, target, lines=lines)
             _talk(call, outcome)
             codes.append(outcome.code)

@@ -1,7 +1,10 @@
 """The shell of `p3i synth`, around a search that is told what to answer by the colour of the photo."""
 
+import contextlib
 import json
+import os
 import shlex
+import subprocess
 import sys
 import types
 from collections.abc import Callable
@@ -222,6 +225,37 @@ def test_an_output_that_cannot_be_written_is_3_before_the_search(photo, search, 
     assert run(["synth", photo("a.png"), "-o", "nowhere/a.p3p"]) == 3
     assert "no folder nowhere" in capsys.readouterr().err
     assert search.configs == []
+
+
+def test_the_progress_bar_stays_on_stderr_and_vanishes(photo) -> None:
+    pty = pytest.importorskip("pty")
+    script = (
+        "import sys, types\n"
+        "from p3i.search.result import StopReason, SynthesisResult\n"
+        "def synthesize(image, config, *, progress, trace=None):\n"
+        "    progress('proposing poses', 0.5)\n"
+        "    return SynthesisResult(program=None, stop=StopReason.NO_PATTERN)\n"
+        "module = types.ModuleType('p3i.search.synthesize')\n"
+        "module.synthesize = synthesize\n"
+        "sys.modules['p3i.search.synthesize'] = module\n"
+        "from p3i.cli.main import run\n"
+        "sys.exit(run(['synth', 'a.png', '--format', 'jsonl']))\n"
+    )
+    photo("a.png")
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+    done = subprocess.run(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=theirs, timeout=60, env=environment
+    )
+    os.close(theirs)
+    shown = ""
+    with contextlib.suppress(OSError):  # Linux says so when all is read
+        while part := os.read(ours, 4096):
+            shown += part.decode(errors="replace")
+    os.close(ours)
+    assert json.loads(done.stdout)["code"] == 5
+    assert "a.png: proposing poses" in shown
+    assert shown.rstrip().endswith("no regular pattern")
 
 
 def test_top_lists_candidates(photo, capsys) -> None:
