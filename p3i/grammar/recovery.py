@@ -38,12 +38,12 @@ def read_heads(found: Words) -> tuple[tuple[Head, ...], tuple[Diagnostic, ...], 
         first = piece.tokens[0]
         rule = HEAD_RULES.get(first.type)
         if rule is None:
-            problems.append(_stranger(piece))
+            problems.extend(_stranger(piece))
             whole = False
             continue
         outcome = read_head(rule, piece.tokens)
         if isinstance(outcome, Stopped):
-            problems.append(_explain(outcome, piece))
+            problems.extend(_explain(outcome, piece))
             whole = False
             continue
         heads.append(outcome)
@@ -103,15 +103,34 @@ _STRANGERS = {
 }
 
 
-def _stranger(piece: Piece) -> Diagnostic:
+def _stranger(piece: Piece) -> list[Diagnostic]:
     """A line that starts with no word of the language."""
     first = piece.tokens[0]
     if first.type in _BY_TYPE:
-        return _of_token(first)
+        return _strays(first, piece)
     help = _STRANGERS.get(
         first.lower().removesuffix("-loop"), "statements are SetCameraPose, `for`, `if` and Draw"
     )
-    return error("P101", f"no statement starts with `{_quote(first)}`", span_of(first), help=help)
+    return [error("P101", f"no statement starts with `{_quote(first)}`", span_of(first), help=help)]
+
+
+def _strays(first: Token, piece: Piece) -> list[Diagnostic]:
+    """The word that stopped the reader and those after it that stand nowhere in the language either.
+
+    After a quote without its partner the rest of the line proves nothing.
+    """
+    if str(first) in {'"', "'"}:
+        return [_of_token(first)]
+    after = [
+        token
+        for token in piece.tokens
+        if token.type in _BY_TYPE and span_of(token).start >= span_of(first).start
+    ]
+    return [_of_token(token) for token in after[:_MOST_STRAYS]]
+
+
+_MOST_STRAYS = 8
+"""In one statement: a text that is no program at all need not be listed letter by letter."""
 
 
 _FOREIGN_HELP = {
@@ -166,15 +185,19 @@ def _of_token(token: Token) -> Diagnostic:
     )
 
 
-def _explain(problem: Stopped, piece: Piece) -> Diagnostic:
+def _explain(problem: Stopped, piece: Piece) -> list[Diagnostic]:
     """Why a head could not be read, from the word that stopped its rule."""
+    if problem.token.type in _BY_TYPE:
+        return _strays(problem.token, piece)
+    return [_explain_word(problem, piece)]
+
+
+def _explain_word(problem: Stopped, piece: Piece) -> Diagnostic:
     token, expected = problem.token, problem.expected
     tokens = piece.tokens
     statement = _NAMES[tokens[0].type]
     if token.type == "$END":
         return _unfinished(tokens, statement, expected)
-    if token.type in _BY_TYPE:
-        return _of_token(token)
     span = span_of(token)
     position = next(place for place, other in enumerate(tokens) if other is token)
     before = tokens[position - 1] if position else None

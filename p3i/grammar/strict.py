@@ -108,7 +108,7 @@ def _coordinate_departures(name: str, coordinate: Coordinate, *, ring: bool) -> 
 
 def _leaves(production: str, span: Span | None, *, help: str) -> Diagnostic:
     message = f"this leaves Table 1 at `{production}`: `{PRODUCTIONS[production]}`"
-    return error("P301", message, span, label=f"no `{production}`", help=help)
+    return error("P301", message, span, label=f"outside `{production}`", help=help)
 
 
 def _misspelt(problem: Stopped, text: str, program: Program) -> Diagnostic:
@@ -119,6 +119,9 @@ def _misspelt(problem: Stopped, text: str, program: Program) -> Diagnostic:
     elif word := re.compile(r"\w+").match(text, span.start):
         span = Span(*word.span())
     production = _production_at(program, span.start)
+    before = _production_at(program, len(text[: span.start].rstrip()) - 1)
+    if before in {"Expr", "RExprX", "RExprY"} and production not in {"Expr", "RExprX", "RExprY"}:
+        production = before  # an expression that ends too early
     message = f"this is not spelt as in Table 1: `{PRODUCTIONS[production]}`"
     help = "`p3i fmt --layout table1` writes it so"
     return error("P302", message, span, label=f"in `{production}`", help=help)

@@ -163,17 +163,14 @@ def _comments_by_head(heads: Sequence[Head], reading: HeaderReading) -> list[lis
     order stays when the printer puts each on a line above its statement.
     """
     groups: list[list[str]] = [[] for _ in range(len(heads) + 2)]
-    place = 0
+    begun = group = 0
     for comment in reading.comments:
-        while place < len(heads) and heads[place].span.start < comment.span.start:
-            place += 1
-        # now `place` heads begin before the comment
-        if place == 0:
-            groups[0].append(comment.text)
-        elif comment.span.start < heads[place - 1].span.end or not comment.alone:
-            groups[place].append(comment.text)
-        else:
-            groups[place + 1].append(comment.text)
+        while begun < len(heads) and heads[begun].span.start < comment.span.start:
+            begun += 1
+        inside = begun > 0 and (comment.span.start < heads[begun - 1].span.end or not comment.alone)
+        following = 0 if begun == 0 else begun if inside else begun + 1
+        group = max(group, following)  # a comment beside a late `}` does not overtake those before it
+        groups[group].append(comment.text)
     return groups
 
 

@@ -22,6 +22,8 @@ SLACK = 1e-9
 COINCIDE = 1e-6
 """Draws closer than this, in program units, are one object."""
 
+_RANGE_HELP = "numbers reach up to 1.7e308; write smaller ones"
+
 Point = tuple[float, float, int, int]
 """x, y, i, j. A variable that no loop binds is 0, or 1 where an unbound `i` reads as 1."""
 
@@ -84,7 +86,8 @@ def points(program: Program) -> list[Point]:
         x, y = coordinate_at(draw.x, i, j), coordinate_at(draw.y, i, j)
         if not (math.isfinite(x) and math.isfinite(y)):
             guilty = draw.y if math.isfinite(x) else draw.x
-            raise _refusal("P123", f"a coordinate overflows at i = {i}, j = {j}", guilty.span)
+            message = f"a coordinate overflows at i = {i}, j = {j}"
+            raise _refusal("P123", message, guilty.span, help=_RANGE_HELP)
         found.append((x, y, i, j))
     return found
 
@@ -183,7 +186,7 @@ def _range(loop: For, i: int) -> range:
     """The whole numbers that a loop walks through."""
     ends = [affine_at(bound, i, 0) for bound in (loop.start, loop.stop)]
     if not all(math.isfinite(end) for end in ends):
-        raise _refusal("P123", f"a bound of `for {loop.variable}` overflows", loop.span)
+        raise _refusal("P123", f"a bound of `for {loop.variable}` overflows", loop.span, help=_RANGE_HELP)
     start, stop = (math.ceil(end - SLACK) for end in ends)
     limit = DRAWS.value()
     if stop - start > limit:
@@ -192,14 +195,14 @@ def _range(loop: For, i: int) -> range:
 
 
 def _too_many(loop: For | None, turns: int, limit: int) -> ParseError:
-    counted = f"{turns:,}" if turns < 10**15 else "more than 10^15"
+    counted = f"{turns:,}" if turns < 10**15 else "10^15"
     return _refusal(
         "P122",
-        f"the loops turn {counted} times or more; the limit is {limit:,}",
+        f"the loops turn at least {counted} times; the limit is {limit:,}",
         loop.span if loop else None,
         help=f"narrow the bounds, or {DRAWS.advice()}",
     )
 
 
-def _refusal(code: str, message: str, span: Span | None, *, help: str | None = None) -> ParseError:
+def _refusal(code: str, message: str, span: Span | None, *, help: str) -> ParseError:
     return ParseError((error(code, message, span, help=help),))
