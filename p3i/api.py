@@ -76,9 +76,7 @@ def synth(
     config = dataclasses.replace(config or SearchConfig(), **options)
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
     result = synthesize(_without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
-    name = None
-    if isinstance(photo, str | os.PathLike) and os.fspath(photo) != "-":
-        name = _relative(Path(photo), Path(beside or "."))
+    name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
     heard = tuple(note for note in image.notes if note not in result.notes)
     result = dataclasses.replace(result, notes=heard + result.notes)
     return _with_headers(result, size=image.size, name=name)
@@ -150,12 +148,18 @@ def _without(
     return image
 
 
-def _relative(path: Path, folder: Path) -> str:
-    """`path` as seen from `folder`, with slashes; absolute only where no relative path exists."""
+def _relative(photo: str | os.PathLike[str], folder: Path) -> str | None:
+    """The photo's path as seen from `folder`, with slashes; None for standard input.
+
+    Absolute only where no relative path exists, None too where its bytes are no text.
+    """
+    if os.fspath(photo) == "-":
+        return None
     try:
-        return Path(os.path.relpath(path, folder)).as_posix()
+        name = Path(os.path.relpath(photo, folder)).as_posix()
     except ValueError:  # another drive of Windows
-        return path.absolute().as_posix()
+        name = Path(photo).absolute().as_posix()
+    return name if name.isprintable() else None
 
 
 def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) -> SynthesisResult:

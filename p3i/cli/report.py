@@ -43,11 +43,12 @@ def line(
 
     `kind` stands in the place of `error` for what is none: "note", "info".
     """
-    message = " ".join(message.split())
+    # A file may be called anything, also what no terminal can show.
+    message = " ".join(message.split()).encode("utf-8", "backslashreplace").decode("utf-8")
     if as_json:
         record = {"image": image, kind: message, "code": code}
         record = {name: value for name, value in record.items() if value is not None}
-        click.echo(json.dumps(record, ensure_ascii=False), err=True)
+        click.echo(json.dumps(record), err=True)
         return
     colour = "red" if kind == "error" else "yellow"
     prefix = click.style(f"{kind}:", fg=colour, bold=True) if coloured() else f"{kind}:"

@@ -60,7 +60,7 @@ def command(
             "score": found.normalised,
             "features": config.features,
         }
-        click.echo(json.dumps(record, ensure_ascii=False))
+        click.echo(json.dumps(record))
         return
     click.echo(f"score       {found.normalised:.4f}   normalised; more is better")
     click.echo(f"equation 2  {found.equation2:.6g}   over {found.edges} edges, as printed; less is better")

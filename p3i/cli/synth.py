@@ -240,7 +240,7 @@ def _solve(call: Call, photo: Path, target: Path | None, *, update: api.Progress
 def _write(call: Call, outcome: Outcome, target: Path | None, *, lines: Any) -> None:
     """Write the answer where it belongs, at once."""
     if call.as_jsonl:
-        text = json.dumps(_record(outcome), ensure_ascii=False)
+        text = json.dumps(_record(outcome))
         if lines is None:
             click.echo(text)
         else:
@@ -254,7 +254,7 @@ def _write(call: Call, outcome: Outcome, target: Path | None, *, lines: Any) -> 
     layout = "table1" if call.config.strict else "python"
     best = format_program(outcome.result.program, layout=layout)
     if target is None:
-        click.echo(best, nl=False)
+        click.echo(best.encode("utf-8"), nl=False)  # whatever the locale says
         return
     with files.replacing(target, force=call.force) as stream:
         stream.write(best)

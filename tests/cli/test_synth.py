@@ -372,3 +372,21 @@ def test_an_empty_folder_and_an_empty_glob_are_3(photo, capsys) -> None:
     assert "holds no file of a known kind" in capsys.readouterr().err
     assert run(["synth", "*.jpg"]) == 3
     assert "no file matches *.jpg" in capsys.readouterr().err
+
+
+def test_a_photo_comes_through_standard_input(photo, monkeypatch, capsys) -> None:
+    with open(photo("a.png"), "rb") as stream:
+        monkeypatch.setattr(sys, "stdin", types.SimpleNamespace(buffer=stream))
+        assert run(["synth", "-"]) == 0
+    printed = capsys.readouterr().out
+    assert "SetCameraPose" in printed and "image" not in printed
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
+def test_a_name_that_is_no_text_is_printed_all_the_same(photo, capsys) -> None:
+    name = os.fsdecode(b"\xff\xe9.png")
+    Path(photo("a.png")).rename(name)
+    assert run(["synth", "--format", "jsonl", name]) == 0
+    assert json.loads(capsys.readouterr().out)["image"] == name
+    assert run(["synth", name]) == 0
+    assert run(["synth", "-v", name, "-o", "out/"]) == 0
