@@ -40,6 +40,9 @@ FocalSource = Literal["option", "header", "exif", "default"]
 _DOT_SHARE, _PHOTO_DOT_SHARE = 0.2, 0.11
 """A dot's radius as a share of the spacing; over a photo it should leave the object to be seen."""
 
+_FAR = 1e9
+"""Objects farther from the origin than this, in program units, are not drawn."""
+
 _SPRITE_SHARE = 0.9
 """A sprite's longer side as a share of the spacing."""
 
@@ -123,47 +126,26 @@ def render(
     photo = read_image(image) if isinstance(image, str | PathLike) else image
     camera, focal_source = _camera(program, options, photo)
 
-    pattern = compile(program)
-    found = points(program)
-    # Coinciding draws are one object: painted twice, what is half transparent would not be.
-    kept = [found[place] for place in distinct(found)]
-    objects = np.array([place[:2] for place in kept], dtype=np.float64).reshape(-1, 2)
-    index = np.array([place[2:] for place in kept], dtype=np.int64).reshape(-1, 2)
-    chart = outlines.chart_of(pattern)
-    spacing = outlines.pitch(chart)
-
-    view = _view(program, options, camera, photo, outlines.surroundings(chart, index))
-    if photo is not None and options.size is not None and not options.plane:
-        photo = scaled(photo, options.size)
     pictures = _sprite(program, sprite, folder)
-    layers: list[scene.Layer] = []
-    if photo is not None:
-        layers.append(scene.Pixels(photo_layer(photo, view, camera)))
-    bare = photo is None and pictures is None
-    if options.cells if options.cells is not None else bare:
-        segments = outlines.sides(chart, index)
-        layers += scene.grid(view, segments, over_photo=not bare)
-    if pictures is not None:
-        units = options.sprite_units or _SPRITE_SHARE * spacing
-        layers.append(scene.Pixels(lay(view, [sprite_of(pictures)], objects, units=units)))
-    if options.horizon:
-        layers += scene.horizon(view, over_photo=photo is not None)
-    if options.markers if options.markers is not None else pictures is None:
-        loops = sum(loop is not None for loop in (nest(program).for_i, nest(program).for_j))
-        colours = scene.colours_of(index, loops=loops)
-        radius = (_DOT_SHARE if photo is None else _PHOTO_DOT_SHARE) * spacing
-        layers.append(scene.dots(view, objects, radius=radius, colours=colours, light_rim=photo is not None))
-    see_through = layers and isinstance(layers[0], scene.Pixels) and layers[0].values.shape[2] == 4
-    paper = None if photo is not None and see_through else scene.WHITE
-    centers_px, depth = view.project(objects)
+    # Numbers of any size may stand in a program; what overflows around an object is left out.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        objects = _objects(program)
+        around = outlines.surroundings(objects.chart, objects.index)
+        view = _view(program, options, camera, photo, around)
+        if photo is not None and options.size is not None and not options.plane:
+            photo = scaled(photo, options.size)
+        layers = _layers(objects, view, options, photo=photo, pictures=pictures)
+        centers_px, depth = view.project(objects.points)
+    ground = layers[0] if photo is not None else None
+    transparent = isinstance(ground, scene.Pixels) and ground.values.shape[2] == 4
     return RenderedPicture(
-        scene.Scene(view.size, paper, tuple(layers)),
+        scene.Scene(view.size, None if transparent else scene.WHITE, layers),
         program,
         camera,
         focal_source,
         centers_px,
-        index,
-        _notes(program, photo, depth, options),
+        objects.index,
+        _notes(program, photo, depth, options, too_far=objects.too_far),
     )
 
 
@@ -172,6 +154,58 @@ def overlay(
 ) -> RenderedPicture:
     """The photo with the program drawn over it; `render` with `image`, for callers who start at the photo."""
     return render(program, options, image=image, **changes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Objects:
+    """What a program draws: `points` [M, 2] in program units, `index` [M, 2]; far ones are counted only."""
+
+    chart: outlines.Chart
+    points: np.ndarray
+    index: np.ndarray
+    loops: int
+    too_far: int
+
+
+def _objects(program: Program) -> _Objects:
+    found = points(program)
+    near = [place for place in found if abs(place[0]) < _FAR and abs(place[1]) < _FAR]
+    # Coinciding draws are one object: painted twice, what is half transparent would not be.
+    kept = [near[place] for place in distinct(near)]
+    chart = outlines.chart_of(compile(program))
+    parts = nest(program)
+    return _Objects(
+        chart,
+        np.array([place[:2] for place in kept], dtype=np.float64).reshape(-1, 2),
+        np.array([place[2:] for place in kept], dtype=np.int64).reshape(-1, 2),
+        (parts.for_i is not None) + (parts.for_j is not None),
+        len(found) - len(near),
+    )
+
+
+def _layers(
+    objects: _Objects, view: View, options: RenderOptions, *, photo: Image | None, pictures: Image | None
+) -> tuple[scene.Layer, ...]:
+    """All that is painted, from the ground up; the photo first, where there is one."""
+    spacing = outlines.pitch(objects.chart)
+    bare = photo is None and pictures is None
+    layers: list[scene.Layer] = []
+    if photo is not None:
+        layers.append(scene.Pixels(photo_layer(photo, view)))
+    if options.cells if options.cells is not None else bare:
+        layers += scene.grid(view, outlines.sides(objects.chart, objects.index), over_photo=not bare)
+    if pictures is not None:
+        units = options.sprite_units or _SPRITE_SHARE * spacing
+        layers.append(scene.Pixels(lay(view, [sprite_of(pictures)], objects.points, units=units)))
+    if options.horizon:
+        layers += scene.horizon(view, over_photo=photo is not None)
+    if options.markers if options.markers is not None else pictures is None:
+        colours = scene.colours_of(objects.index, loops=objects.loops)
+        radius = (_DOT_SHARE if photo is None else _PHOTO_DOT_SHARE) * spacing
+        layers.append(
+            scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=photo is not None)
+        )
+    return tuple(layers)
 
 
 def _changed(options: RenderOptions, changes: dict[str, Any]) -> RenderOptions:
@@ -235,7 +269,7 @@ def _sprite(program: Program, sprite: Path_ | Image | None, folder: Path) -> Ima
 
 
 def _notes(
-    program: Program, photo: Image | None, depth: np.ndarray, options: RenderOptions
+    program: Program, photo: Image | None, depth: np.ndarray, options: RenderOptions, *, too_far: int
 ) -> tuple[str, ...]:
     notes: list[str] = list(photo.notes) if photo is not None else []
     canvas = program.header.canvas if program.header else None
@@ -246,8 +280,10 @@ def _notes(
                 f"the program was made for a canvas of {canvas[0]} x {canvas[1]}, whose shape is not that of "
                 f"this photo of {photo.size.width} x {photo.size.height}"
             )
-    if not len(depth):
+    if too_far:
+        notes.append(f"{too_far} objects lie more than {_FAR:g} units away and are not drawn")
+    elif not len(depth):
         notes.append("the program draws nothing")
-    elif behind := int((depth <= 0).sum()):
+    if behind := int((depth <= 0).sum()):
         notes.append(f"{behind} of {len(depth)} objects lie at or behind the camera and are not drawn")
     return tuple(notes)

@@ -19,6 +19,9 @@ from p3i.interp.unroll import nest
 DEFAULT_PITCH = 10.0
 """The spacing, in program units, that is assumed for an object that stands alone."""
 
+_FAR = 1e10
+"""Points farther out than this, in program units, are left out: they come of overflows."""
+
 _BEND_DEG = 4.0
 """The angle that a straight part of a bent side covers."""
 
@@ -70,7 +73,10 @@ def chart_of(pattern: Pattern) -> Chart:
 
 
 def pitch(chart: Chart) -> float:
-    """How close the objects stand, in program units: nine in ten have no neighbour closer than this."""
+    """How close the objects stand, in program units: nine in ten have no neighbour closer than this.
+
+    At most 1000: ten canvases.
+    """
     index = chart.pattern.index.numpy().astype(float)
     if not chart.directions or not len(index):
         return DEFAULT_PITCH
@@ -81,14 +87,12 @@ def pitch(chart: Chart) -> float:
     apart = np.stack([np.linalg.norm(_points(chart.pattern, index + move) - here, axis=1) for move in moves])
     apart = np.where(apart > 1e-6, apart, np.inf).min(axis=0)
     apart = apart[np.isfinite(apart)]
-    return float(np.quantile(apart, 0.1)) if len(apart) else DEFAULT_PITCH
+    return min(float(np.quantile(apart, 0.1)), 1000.0) if len(apart) else DEFAULT_PITCH
 
 
 def surroundings(chart: Chart, index: np.ndarray) -> np.ndarray:
-    """Points around the objects `index` [M, 2], a whole cell away from them: [M, 12, 2]."""
-    around = [
-        np.array(turn) for turn in ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))
-    ]
+    """Points around the objects `index` [M, 2], a whole cell away from them: [K, 2]."""
+    around = np.array([(-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)])
     found = []
     for turn in around:
         place = _places(index)
@@ -96,7 +100,8 @@ def surroundings(chart: Chart, index: np.ndarray) -> np.ndarray:
         found.append(chart.at(place))
     middle, apart = _points(chart.pattern, index), pitch(chart)
     found += [middle + apart * turn for turn in around[::2]]
-    return np.stack(found, axis=1)
+    points = np.concatenate(found)
+    return points[(np.abs(points) < _FAR).all(axis=1)]
 
 
 def sides(chart: Chart, index: np.ndarray) -> np.ndarray:
@@ -121,7 +126,8 @@ def sides(chart: Chart, index: np.ndarray) -> np.ndarray:
             lines.append(chart.at(place))
         line = np.stack(lines, axis=1)
         segments.append(np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 2))
-    return np.concatenate(segments)
+    found = np.concatenate(segments)
+    return found[(np.abs(found) < _FAR).all(axis=(1, 2))]
 
 
 def _places(index: np.ndarray) -> np.ndarray:
@@ -135,7 +141,7 @@ def _parts(chart: Chart) -> int:
     if not chart.directions or not turns:
         return 1
     most = max(max(abs(turn.i), abs(turn.j)) for turn in turns)
-    return int(np.clip(np.ceil(min(most, 360) / _BEND_DEG), 2, 45))
+    return int(np.clip(np.ceil(min(most, 180) / _BEND_DEG), 2, 45))
 
 
 def _orientations(pattern: Pattern, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
