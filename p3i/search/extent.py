@@ -1,0 +1,135 @@
+"""The extent of a lattice: which of its cells hold an object, and the short outline that says so.
+
+Each cell of the lattice is compared with the common cell (p3i.search.alike). How often cells well inside
+the pattern fail that test, and cells well outside pass it, is estimated from the photo itself, which
+turns agreement into log-odds; the outline of the greatest evidence less description length is the answer
+(p3i.search.outline). What lies under a mask, behind a person or on the far side of the picture's border
+is unknown, and an outline may or may not run over it.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.search.alike import Alike, look_alike, working_size
+from p3i.search.outline import Outline, best_outline
+from p3i.vision.cells import agreement, shifted
+from p3i.vision.sheet import cell_sides_px, project
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+_SLACK = 0.09  # of a period: how far an object may lie from its place
+_SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """The cells of a lattice that hold an object.
+
+    `cells` are those that the outline draws and whose middle shows in the photo; `presence` gives each
+    visible cell its probability (0..1) of holding an object, cell by cell, without the outline's help.
+    `i_range`, `j_range` are half-open; a guard (a, b, c) keeps `a*i + b*j >= c`. `agreement` is that of a
+    typical object with the common one (1: all equal).
+    """
+
+    cells: frozenset[tuple[int, int]]
+    presence: dict[tuple[int, int], float]
+    i_range: tuple[int, int]
+    j_range: tuple[int, int]
+    guards: tuple[tuple[int, int, int], ...]
+    agreement: float
+
+
+def find_extent(
+    pixels: Floats,
+    valid: Mask,
+    image_from_plane: Array,
+    basis: Array,
+    origin: Array,
+    support: NDArray | None = None,
+) -> Extent | None:
+    """The cells of a lattice that hold an object in a photo; None where none is seen to.
+
+    Convention: pixels [H, W, 3] RGB in 0..1, valid [H, W]; `image_from_plane` 3x3 maps plane points in front
+    of the camera to positive third coordinates; basis [2, 2] has rows u, v and origin [2] is the middle of an
+    object, all in plane coordinates; support [H, W], boolean or in 0..1, may be rough.
+    """
+    small, mask, matrix = working_size(pixels, valid, image_from_plane)
+    if support is not None and support.shape != mask.shape:
+        support = cv2.resize(np.asarray(support, np.float32), mask.shape[::-1], interpolation=cv2.INTER_AREA)
+    alike = look_alike(small, mask, matrix, basis, origin, support)
+    if alike is None or alike.level <= 0:
+        return None
+    evidence = _evidence(alike, mask.shape)
+    box = alike.sheet.box
+    grid = evidence.reshape(box.rows, box.columns)
+    outline = best_outline(grid, i_start=box.i_start, j_start=box.j_start)
+    if outline is None:
+        return None
+    return _extent(alike, evidence, outline, mask.shape)
+
+
+def _indices(alike: Alike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    box = alike.sheet.box
+    i, j = np.meshgrid(np.arange(box.i_start, box.i_stop), np.arange(box.j_start, box.j_stop))
+    return i.ravel(), j.ravel()
+
+
+def _middle_shows(alike: Alike, shape: tuple[int, int]) -> Mask:
+    """Whether the middle of each cell [N] lies in the photo, large enough to be judged."""
+    i, j = _indices(alike)
+    points = np.stack([i, j], axis=-1).astype(float)
+    at, front = project(alike.image_from_cells, points)
+    shorter = cell_sides_px(alike.image_from_cells, points)[1]
+    inside = (at[:, 0] >= 0) & (at[:, 0] <= shape[1] - 1) & (at[:, 1] >= 0) & (at[:, 1] <= shape[0] - 1)
+    return front & inside & (shorter >= _SMALLEST_PX)
+
+
+def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
+    """Log-odds [N] that each cell holds an object."""
+    box, side = alike.sheet.box, alike.sheet.side
+    slack = max(1, round(_SLACK * side))
+    near = np.array([(x, y) for x in (-slack, 0, slack) for y in (-slack, 0, slack)])
+    fit = agreement(alike.cells, alike.cells_known, shifted(alike.template, near)).max(axis=1)
+    visible = alike.visible
+    judged = _middle_shows(alike, shape) & (visible > 0.25)
+    if not judged.any():
+        return np.zeros(len(fit))
+    inside_level = float(np.average(fit, weights=alike.weights + 1e-9))
+    others = judged & (alike.weights < 0.1)
+    outside_level = float(np.clip(np.median(fit[others]), 0, 0.3)) if others.sum() > 8 else 0.15
+    score = (fit - outside_level) / max(inside_level - outside_level, 0.05)
+    passes = (judged & (score > 0.5)).reshape(box.rows, box.columns)
+    region = cv2.morphologyEx(np.pad(passes.astype(np.uint8), 3), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    region = cv2.morphologyEx(region, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))[3:-3, 3:-3].ravel() > 0
+    misses = _share(score[judged & region] <= 0.5, 0.05, low=0.03, high=0.5)
+    strays = _share(score[judged & ~region] > 0.5, 0.05, low=0.02, high=0.3)
+    worst, best = np.log(misses / (1 - strays)), np.log((1 - misses) / strays)
+    trust = np.clip((score - 0.3) / 0.4, 0, 1)
+    return np.where(judged, (worst + (best - worst) * trust) * np.sqrt(visible), 0.0)
+
+
+def _share(hits: NDArray[np.bool_], prior: float, *, low: float, high: float) -> float:
+    """The share of hits, drawn towards a prior worth ten cells."""
+    return float(np.clip((hits.sum() + 10 * prior) / (len(hits) + 10), low, high))
+
+
+def _extent(alike: Alike, evidence: Array, outline: Outline, shape: tuple[int, int]) -> Extent:
+    i, j = _indices(alike)
+    shown = _middle_shows(alike, shape)
+    drawn = shown & outline.holds(i, j)
+    odds = 1 / (1 + np.exp(-evidence))
+    return Extent(
+        cells=frozenset(zip(i[drawn].tolist(), j[drawn].tolist(), strict=True)),
+        presence={
+            (int(a), int(b)): float(p) for a, b, p in zip(i[shown], j[shown], odds[shown], strict=True)
+        },
+        i_range=outline.i_range,
+        j_range=outline.j_range,
+        guards=outline.guards,
+        agreement=alike.level,
+    )
