@@ -25,10 +25,10 @@ class Limit:
         return f"set the environment variable {self.variable} to raise the limit{most}"
 
 
-SOURCE = Limit("P3I_MAX_SOURCE", 1_000_000)
+SOURCE = Limit("P3I_MAX_SOURCE", 100_000)
 """Characters of a program's text."""
 
-NESTING = Limit("P3I_MAX_NESTING", 100, ceiling=300)
+NESTING = Limit("P3I_MAX_NESTING", 100, ceiling=200)
 """Brackets inside one another; likewise loops and guards above a draw. Python's stack sets the ceiling."""
 
 DRAWS = Limit("P3I_MAX_DRAWS", 1_000_000)

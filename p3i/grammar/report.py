@@ -61,7 +61,7 @@ def one_line(diagnostics: Sequence[Diagnostic], *, source: str, path: str) -> st
         line, column = line_and_column(first.span.start, line_starts(source))
         place = f"{path}:{line}:{column}"
     more = f" (and {len(diagnostics) - 1} more)" if len(diagnostics) > 1 else ""
-    return printable(f"{place}: {first.severity}[{first.code}]: {first.message}{more}")
+    return printable(f"{place}: {first.code}: {first.message}{more}")
 
 
 def line_starts(source: str) -> list[int]:
