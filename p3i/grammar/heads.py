@@ -48,12 +48,16 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class CameraHead:
+    """`SetCameraPose(...)`."""
+
     arguments: tuple[Argument, ...]
     span: Span
 
 
 @dataclass(frozen=True, slots=True)
 class ForHead:
+    """`for variable in range(bounds)`."""
+
     variable: str
     variable_span: Span
     bounds: tuple[Value, ...]
@@ -70,6 +74,8 @@ class IfHead:
 
 @dataclass(frozen=True, slots=True)
 class DrawHead:
+    """`Draw(...)`."""
+
     arguments: tuple[Argument, ...]
     span: Span
 
