@@ -102,7 +102,17 @@ def look_alike(
         weights *= 0.1 + 0.9 * _support_of_cells(support, image_from_cells, sheet)
     template, fit, weights, level = _agreed_cell(cells, cells_known, weights)
     return Alike(
-        image_from_cells, sheet, features, known, cells, cells_known, template, fit, weights, level, colour_share
+        image_from_cells,
+        sheet,
+        features,
+        known,
+        cells,
+        cells_known,
+        template,
+        fit,
+        weights,
+        level,
+        colour_share,
     )
 
 
@@ -158,7 +168,9 @@ def _self_agreement(values: Floats, known: Mask, side: int) -> tuple[Floats, Flo
 
     half = side // 2
     whole = level(((side, 0), (0, side)))
-    between = np.maximum.reduce([level(((half, 0),)), level(((0, half),)), level(((half, half), (half, -half)))])
+    between = np.maximum.reduce(
+        [level(((half, 0),)), level(((0, half),)), level(((half, half), (half, -half)))]
+    )
     return whole - between, whole
 
 
@@ -167,7 +179,11 @@ def _overlap(shape: tuple[int, ...], dx: int, dy: int) -> tuple[tuple[slice, sli
 
     def pair(step: int, size: int) -> tuple[slice, slice]:
         step = int(np.clip(step, -size, size))
-        return (slice(0, size - step), slice(step, size)) if step >= 0 else (slice(-step, size), slice(0, size + step))
+        return (
+            (slice(0, size - step), slice(step, size))
+            if step >= 0
+            else (slice(-step, size), slice(0, size + step))
+        )
 
     (x0, x1), (y0, y1) = pair(dx, shape[1]), pair(dy, shape[0])
     return (y0, x0), (y1, x1)

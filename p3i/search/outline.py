@@ -40,7 +40,9 @@ class Outline:
 
     def holds(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of the cells (i, j) lie inside."""
-        inside = (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
+        inside = (
+            (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
+        )
         for a, b, c in self.guards:
             inside &= a * i + b * j >= c
         return inside

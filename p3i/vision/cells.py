@@ -22,7 +22,9 @@ _FLAT = 0.4  # a cell with less energy than this share of the template's counts 
 
 def lab(rgb: Floats) -> Floats:
     """RGB [3, H, W] in 0..1 to Lab [3, H, W], scaled so that L runs over 0..1 and a, b alike."""
-    return cv2.cvtColor(np.ascontiguousarray(rgb.transpose(1, 2, 0)), cv2.COLOR_RGB2LAB).transpose(2, 0, 1) / 100
+    return (
+        cv2.cvtColor(np.ascontiguousarray(rgb.transpose(1, 2, 0)), cv2.COLOR_RGB2LAB).transpose(2, 0, 1) / 100
+    )
 
 
 def masked_mean(values: Floats, seen: Mask, size: int) -> Floats:
@@ -37,8 +39,8 @@ def sheet_features(sheet: Sheet) -> tuple[Floats, Mask]:
     """Features [6, H, W] of a sheet and where they are known.
 
     Three of gradient: its strength and its orientation as a double angle, blind to black against white
-    (DESIGN: what stays equal when the light or the paint changes). Three of colour: Lab less its local mean. Both groups
-    are divided by their local energy, so that shadow and haze do not decide.
+    (what stays equal when the light or the paint changes). Three of colour: Lab less its local mean. Both
+    groups are divided by their local energy, so that shadow and haze do not decide.
     """
     colour = lab(sheet.values)
     seen = sheet.seen
@@ -65,7 +67,7 @@ def _normalised(values: Floats, seen: Mask, side: int) -> Floats:
 
 
 def cut(values: NDArray, side: int) -> NDArray:
-    """Cells [N, C, side, side] of a sheet's values [C, rows*side, columns*side]; of [H, W], [N, side, side]."""
+    """Cells [N, C, side, side] of a sheet [C, rows*side, columns*side]; [N, side, side] of a sheet [H, W]."""
     *head, height, width = values.shape
     grid = values.reshape(*head, height // side, side, width // side, side)
     if head:
@@ -78,7 +80,9 @@ def weighted_mean(cells: Floats, seen: Mask, weights: NDArray) -> Floats:
     flat = cells.reshape(len(cells), -1)
     total = weights.astype(np.float32) @ flat
     known = weights.astype(np.float32) @ seen.reshape(len(seen), -1).astype(np.float32)
-    return (total.reshape(cells.shape[1:]) / np.maximum(known.reshape(seen.shape[1:]), 1e-6)).astype(np.float32)
+    return (total.reshape(cells.shape[1:]) / np.maximum(known.reshape(seen.shape[1:]), 1e-6)).astype(
+        np.float32
+    )
 
 
 def median_cell(cells: Floats, seen: Mask, chosen: NDArray, *, most: int = 150) -> tuple[Floats, Floats]:
@@ -93,7 +97,7 @@ def median_cell(cells: Floats, seen: Mask, chosen: NDArray, *, most: int = 150) 
 
 
 def _nanmedian(values: NDArray) -> NDArray:
-    """Median over the first axis of what is not nan; 0 where nothing is known. (np.nanmedian warns and is slow.)"""
+    """Median over the first axis of what is not nan; 0 where nothing is known (np.nanmedian would warn)."""
     ordered = np.sort(values, axis=0)
     known = np.isfinite(ordered).sum(axis=0)
     low = np.take_along_axis(ordered, np.maximum((known - 1) // 2, 0)[None], axis=0)[0]

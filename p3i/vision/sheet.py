@@ -59,14 +59,14 @@ def cells_from_basis(image_from_plane: Array, basis: Array, origin: Array) -> Ar
     return np.asarray(image_from_plane, float) @ plane_from_cells
 
 
-def project(matrix: Array, points: Array) -> tuple[Array, Mask]:
+def project(matrix: NDArray, points: NDArray) -> tuple[Array, Mask]:
     """Points [..., 2] through a homography, and which of them lie in front (third coordinate > 0)."""
     mapped = points @ matrix[:, :2].T + matrix[:, 2]
     front = mapped[..., 2] > 1e-9
     return mapped[..., :2] / np.where(front, mapped[..., 2], 1.0)[..., None], front
 
 
-def cell_sides_px(image_from_cells: Array, points: Array) -> tuple[Array, Array]:
+def cell_sides_px(image_from_cells: NDArray, points: NDArray) -> tuple[Array, Array]:
     """Length of u and v in the photo, in pixels, at lattice points [N, 2]: two arrays [N].
 
     The second is the shorter extent of the cell (its area over its longer side), which is what limits
