@@ -123,7 +123,9 @@ def verify_format(
 
 
 def _same(before: Sketch, after: Sketch) -> bool:
-    return before == after and comments(before.template) == comments(after.template)
+    blocks = [sketch.template.header.lines if sketch.template.header else () for sketch in (before, after)]
+    remarks = [comments(sketch.template) for sketch in (before, after)]
+    return before == after and blocks[0] == blocks[1] and remarks[0] == remarks[1]
 
 
 class FormatLawError(P3IError):

@@ -3,6 +3,7 @@
 What needs the loops unrolled (empty loops, points on a line, behind the camera) is in p3i/language.py.
 """
 
+import math
 import re
 from collections.abc import Iterator
 
@@ -35,9 +36,10 @@ def _loop_errors(program: Program) -> Iterator[Diagnostic]:
         seen.append(statement.variable)
         if statement.variable == "i":
             for bound in (statement.start, statement.stop):
-                if bound.constant != int(bound.constant):
+                below = math.floor(bound.constant)
+                if bound.constant != below:
                     message = "a bound of `for i` is a whole number"
-                    help = f"write {int(bound.constant)} or {int(bound.constant) + 1}"
+                    help = f"write {below} or {below + 1}"
                     yield error("P113", message, bound.span, help=help)
 
 

@@ -6,7 +6,7 @@ read by its own rule. What only shows in the whole (a missing indent, a brace th
 explained from the place where the whole grammar stopped.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 
 from lark import Token
@@ -236,18 +236,13 @@ _EXAMPLES = {
 
 def _unfinished(tokens: Sequence[Token], statement: str, expected: frozenset[str]) -> Diagnostic:
     """A head that ends too early: an open bracket is shown where it opens."""
-    opened: list[Token] = []
-    for token in tokens:
-        if token.type in OPENING:
-            opened.append(token)
-        elif token.type in CLOSING and opened:
-            opened.pop()
+    opened = _unclosed(tokens, OPENING, CLOSING)
     if opened and "RPAR" in expected:
         message = f"a `(` of `{statement}` is not closed"
         return error(
             "P101",
             message,
-            span_of(opened[-1]),
+            span_of(opened),
             label="opened here",
             help=f"write `)` at its end; {_EXAMPLES[statement]}",
         )
@@ -293,7 +288,7 @@ def _wanted(expected: frozenset[str]) -> str | None:
 def explain_structure(problem: Stopped, found: Words) -> Diagnostic:
     """Why heads that are all well formed do not nest: indentation, braces, separators."""
     token, expected = problem.token, problem.expected
-    unclosed = _unclosed_brace(found.tokens)
+    unclosed = _unclosed(found.tokens, {"LBRACE"}, {"RBRACE"})
     if token.type == "$END" or (unclosed is not None and token.type in {"_NL", "_DEDENT"}):
         if unclosed is not None:
             return error(
@@ -326,12 +321,13 @@ def explain_structure(problem: Stopped, found: Words) -> Diagnostic:
     return error("P101", f"`{_quote(token)}` cannot stand here", visible, label=_wanted(expected))
 
 
-def _unclosed_brace(tokens: Sequence[Token]) -> Token | None:
+def _unclosed(tokens: Sequence[Token], opening: Set[str], closing: Set[str]) -> Token | None:
+    """The last bracket that opens and is not closed."""
     opened: list[Token] = []
     for token in tokens:
-        if token.type == "LBRACE":
+        if token.type in opening:
             opened.append(token)
-        elif token.type == "RBRACE" and opened:
+        elif token.type in closing and opened:
             opened.pop()
     return opened[-1] if opened else None
 

@@ -1,7 +1,7 @@
 """From the heads of a program to the program: arguments, bounds and guards get their places in the tree."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from p3i.grammar.ast import (
     Affine,
@@ -83,11 +83,10 @@ def plant(heads: Sequence[Head], reading: HeaderReading, *, end: int, whole: boo
     `whole` is false where some heads could not be read, so that what is missing proves nothing.
     """
     planting = Planting()
-    chain = _chain(heads, planting, end=end, whole=whole)
+    in_order = _in_order(heads, planting, end=end, whole=whole)
     comments = _comments_by_head(heads, reading)
     camera = CameraPose(comments=tuple(comments[0]))
-    statement: Statement | None = None
-    links: list[tuple[For | If | Draw, Head]] = []
+    chain: list[Statement] = []
     guards = 0
     for place, head in enumerate(heads, start=1):
         own = tuple(comments[place])
@@ -96,36 +95,40 @@ def plant(heads: Sequence[Head], reading: HeaderReading, *, end: int, whole: boo
                 rx, ry = _camera_angles(head, planting)
                 camera = CameraPose(rx, ry, span=head.span, comments=(*camera.comments, *own))
             case ForHead():
-                links.append((_for(head, planting, own), head))
+                chain.append(_for(head, planting, own))
             case IfHead():
                 for guard in head.guards:
                     guards += 1
                     value = planting.affine(guard, f"if_{guards}", what="a guard")
-                    links.append((If(value, _NOTHING, span=head.span, comments=own), head))
+                    chain.append(If(value, _NOTHING, span=head.span, comments=own))
                     own = ()
             case DrawHead():
-                links.append((_draw(head, planting, own), head))
-    if planting.problems or not chain:
+                chain.append(_draw(head, planting, own))
+    if planting.problems or not in_order:
         return Tree(None, planting.holes, tuple(planting.problems))
-    for link, _ in reversed(links):
-        match link:
-            case Draw():
-                statement = link
-            case If():
-                assert isinstance(statement, If | Draw)
-                statement = If(link.guard, statement, link.span, link.comments)
-            case For():
-                assert statement is not None
-                statement = For(link.variable, link.start, link.stop, statement, link.span, link.comments)
-    assert statement is not None
-    program = Program(camera, statement, reading.header, trailing_comments=tuple(comments[-1]))
+    program = Program(camera, _nested(chain), reading.header, trailing_comments=tuple(comments[-1]))
     return Tree(program, planting.holes, ())
 
 
 _NOTHING = Draw(Affine(), Affine())
+"""What a loop or guard holds until `_nested` puts the next statement into it."""
 
 
-def _chain(heads: Sequence[Head], planting: Planting, *, end: int, whole: bool) -> bool:
+def _nested(chain: Sequence[Statement]) -> Statement:
+    """The statements inside one another; `_in_order` made sure that they fit."""
+    inner = chain[-1]
+    for outer in reversed(chain[:-1]):
+        match outer, inner:
+            case For(), _:
+                inner = replace(outer, body=inner)
+            case If(), If() | Draw():
+                inner = replace(outer, body=inner)
+            case _:
+                raise AssertionError("statements out of order")
+    return inner
+
+
+def _in_order(heads: Sequence[Head], planting: Planting, *, end: int, whole: bool) -> bool:
     """Whether the heads are a camera (or none), loops, guards and one draw, in this order."""
     before = len(planting.problems)
     nested = "a program is one camera, at most `for i` around `for j`, guards, and one Draw"
