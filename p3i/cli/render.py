@@ -48,7 +48,7 @@ class SizeType(click.ParamType):
 @click.option("--image", metavar="PHOTO", help="Draw over this photo.")
 @click.option("--sprite", metavar="FILE", help="A picture to stand at each object, warped by the camera.")
 @click.option("--sprite-units", type=float, metavar="U", help=sentence("sprite_units"))
-@click.option("--size", type=SizeType(), default=default("size"), help=sentence("size"))
+@click.option("--size", type=SizeType(), metavar="WxH", default=default("size"), help=sentence("size"))
 @click.option("--plane", is_flag=True, default=default("plane"), help=sentence("plane"))
 @click.option("--markers/--no-markers", default=default("markers"), help=sentence("markers"))
 @click.option("--cells/--no-cells", default=default("cells"), help=sentence("cells"))

@@ -52,7 +52,7 @@ def _paint_strokes(canvas: np.ndarray, strokes: Strokes) -> None:
     low = strokes.segments.min(axis=1) - strokes.width
     high = strokes.segments.max(axis=1) + strokes.width
     colour = np.array(strokes.colour, np.uint8)
-    for left, top in _tiles(canvas):
+    for left, top in _tiles(Size(canvas.shape[1], canvas.shape[0])):
         tile = canvas[top : top + _TILE, left : left + _TILE]
         height, width = tile.shape[:2]
         near = (high >= (left, top)).all(axis=1) & (low <= (left + width, top + height)).all(axis=1)
@@ -79,20 +79,22 @@ def _line_coverage(segments: np.ndarray, width: float, size: Size) -> np.ndarray
 
 
 def _paint_dots(canvas: np.ndarray, dots: Dots) -> None:
+    height, width = canvas.shape[:2]
     for center, axes, angle, colour, rim in zip(
         dots.centers, dots.axes, np.radians(dots.angles_deg), dots.colours, dots.rims, strict=True
     ):
         reach = float(axes.max()) + dots.rim_width + 1
         left, top = (max(0, int(part)) for part in np.floor(center - reach))
         right, bottom = (int(part) + 1 for part in np.ceil(center + reach))
-        window = canvas[top:bottom, left:right]
-        if not window.size:
-            continue
-        x = np.arange(left, left + window.shape[1], dtype=np.float32) - np.float32(center[0])
-        y = np.arange(top, top + window.shape[0], dtype=np.float32)[:, None] - np.float32(center[1])
-        u, v = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
-        blend(window, rim, _ellipse_coverage(u, v, axes + dots.rim_width / 2))
-        blend(window, colour, _ellipse_coverage(u, v, np.maximum(axes - dots.rim_width / 2, 0.3)))
+        for x0, y0 in _tiles(
+            Size(max(1, min(right, width)), max(1, min(bottom, height))), left=left, top=top
+        ):
+            window = canvas[y0 : min(bottom, y0 + _TILE), x0 : min(right, x0 + _TILE)]
+            x = np.arange(x0, x0 + window.shape[1], dtype=np.float32) - np.float32(center[0])
+            y = np.arange(y0, y0 + window.shape[0], dtype=np.float32)[:, None] - np.float32(center[1])
+            u, v = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+            blend(window, rim, _ellipse_coverage(u, v, axes + dots.rim_width / 2))
+            blend(window, colour, _ellipse_coverage(u, v, np.maximum(axes - dots.rim_width / 2, 0.3)))
 
 
 def _ellipse_coverage(u: np.ndarray, v: np.ndarray, axes: np.ndarray) -> np.ndarray:
@@ -105,6 +107,8 @@ def _ellipse_coverage(u: np.ndarray, v: np.ndarray, axes: np.ndarray) -> np.ndar
 
 def blend(canvas: np.ndarray, colour: np.ndarray, opacity: np.ndarray) -> None:
     """Paint over `canvas` [H, W, 3 or 4] uint8 in place: `colour` [3] or [H, W, 3], `opacity` [H, W]."""
+    if not opacity.any():
+        return
     over = opacity[:, :, None]
     if canvas.shape[2] == 3:
         canvas[:] = np.rint(canvas + over * (np.asarray(colour, np.float32) - canvas))
@@ -126,7 +130,8 @@ def _bands(height: int) -> Iterator[slice]:
         yield slice(top, top + _TILE)
 
 
-def _tiles(canvas: np.ndarray) -> Iterator[tuple[int, int]]:
-    for top in range(0, canvas.shape[0], _TILE):
-        for left in range(0, canvas.shape[1], _TILE):
-            yield left, top
+def _tiles(end: Size, *, left: int = 0, top: int = 0) -> Iterator[tuple[int, int]]:
+    """The upper left corners of the squares that cover a canvas from (left, top) up to `end`."""
+    for y in range(top, end.height, _TILE):
+        for x in range(left, end.width, _TILE):
+            yield x, y
