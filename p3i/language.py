@@ -11,7 +11,7 @@ from p3i.errors import FileError, P3IError, UsageError
 from p3i.grammar import checker
 from p3i.grammar.ast import Program, Span
 from p3i.grammar.diagnostics import Diagnostic, ParseError, in_order, warning
-from p3i.grammar.layout import source_text
+from p3i.grammar.layout import most_bytes, source_text
 from p3i.grammar.leaves import comments
 from p3i.grammar.parser import parse, parse_with_holes
 from p3i.grammar.printer import Layout, format_program
@@ -146,9 +146,10 @@ def expand(source: str | bytes | Program, *, path: str = "<program>") -> list[Po
 
 
 def read(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a file. Raises FileError with a reason."""
+    """The bytes of a file, as far as a program's text may reach. Raises FileError with a reason."""
     try:
-        return Path(path).read_bytes()
+        with open(path, "rb") as stream:
+            return stream.read(most_bytes() + 1)
     except OSError as problem:
         raise FileError(f"cannot read {os.fspath(path)}: {_reason(problem)}") from problem
 

@@ -12,6 +12,7 @@ from p3i.cli import report
 from p3i.errors import P3IError
 from p3i.files import gather
 from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.layout import most_bytes
 
 SUFFIXES = frozenset({".p3p"})
 STDIN = "-"
@@ -40,8 +41,8 @@ def read(word: str) -> bytes:
 
 
 def stdin() -> bytes:
-    """All of standard input."""
-    return sys.stdin.buffer.read()
+    """Standard input, as far as a program's text may reach."""
+    return sys.stdin.buffer.read(most_bytes() + 1)
 
 
 def shown(path: str) -> str:

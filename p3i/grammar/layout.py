@@ -33,6 +33,8 @@ class Words:
 
 def decode(source: str | bytes) -> str | Diagnostic:
     """The text, or why there is none."""
+    if len(source) > (most_bytes() if isinstance(source, bytes) else SOURCE.value()):
+        return _too_long()
     if isinstance(source, bytes):
         try:
             source = source.decode("utf-8")
@@ -40,11 +42,17 @@ def decode(source: str | bytes) -> str | Diagnostic:
             before = len(source[: problem.start].decode("utf-8"))
             message = f"byte {source[problem.start]:#04x} at offset {problem.start} is not UTF-8 text"
             return error("P100", message, Span(before, before + 1), help="save the file as UTF-8")
-    limit = SOURCE.value()
-    if len(source) > limit:
-        message = f"the text has {len(source):,} characters; the limit is {limit:,}"
-        return error("P120", message, None, help=SOURCE.advice())
-    return source
+    return source if len(source) <= SOURCE.value() else _too_long()
+
+
+def most_bytes() -> int:
+    """No text within the limit has more bytes than this; a reader of files need not go further."""
+    return 4 * SOURCE.value()
+
+
+def _too_long() -> Diagnostic:
+    message = f"the text is longer than the limit of {SOURCE.value():,} characters"
+    return error("P120", message, None, help=SOURCE.advice())
 
 
 def source_text(source: str | bytes) -> str:

@@ -133,3 +133,8 @@ def test_colour_is_for_terminals_alone(
 def test_quiet_leaves_the_summary_out(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", "-q", str(files / "odd.p3p")]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_an_endless_file_is_refused_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "/dev/zero"]) == 4
+    assert "error[P120]" in capsys.readouterr().out

@@ -133,7 +133,7 @@ LAYOUT = {"_NL": st.just("\n"), "_INDENT": st.just("    "), "_DEDENT": st.just("
 
 
 @given(from_lark(reader.build_superset(reader.grammar_text("p3p.lark")), start="program", explicit=LAYOUT))
-@lenient
+@settings(lenient, max_examples=25)  # such strings take long to draw
 def test_parse_is_total_on_strings_of_the_superset(text: str) -> None:
     outcome = parse(text)
     if isinstance(outcome, Program):

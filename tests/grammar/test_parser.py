@@ -75,7 +75,8 @@ def test_an_error_points_at_its_place(text: str, code: str, place: tuple[int, in
 def test_a_text_that_is_too_long_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     long = "# " + "x" * 100_000
     assert [found.code for found in problems(long)] == ["P120"]
-    assert "the limit is 100,000" in problems(long)[0].message
+    assert "the limit of 100,000" in problems(long)[0].message
+    assert [found.code for found in problems(b"\xc3" * 400_001)] == ["P120"]
     monkeypatch.setenv("P3I_MAX_SOURCE", "2000000")
     assert [found.code for found in problems(long)] == ["P111"]
 
