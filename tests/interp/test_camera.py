@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, Header, Program
@@ -42,6 +42,7 @@ def test_the_homography_is_the_golden_one(row: dict) -> None:
     np.testing.assert_allclose(points.numpy(), image.numpy(), rtol=1e-12)
 
 
+@settings(deadline=None)
 @given(angles, angles, focals, sizes, st.lists(st.tuples(st.floats(-40, 40), st.floats(-40, 40)), min_size=1))
 def test_projection_equals_opencv(rx: float, ry: float, focal: float, size: Size, plane: list) -> None:
     camera = Camera(rx, ry, focal)
@@ -88,6 +89,7 @@ def test_the_inverse_says_what_lies_beyond_the_horizon() -> None:
     assert in_front.tolist() == expected
 
 
+@settings(deadline=None)
 @given(angles, angles)
 def test_far_points_of_the_plane_approach_the_horizon(rx: float, ry: float) -> None:
     size = Size(640, 480)
@@ -111,6 +113,7 @@ def test_a_plane_seen_straight_on_has_no_horizon() -> None:
     assert Camera(0, 0).horizon(Size(10, 10)) is None
 
 
+@settings(deadline=None)
 @given(st.floats(-89, 89), st.floats(-89, 89), focals)
 def test_the_normal_gives_the_angles_back(rx: float, ry: float, focal: float) -> None:
     camera = Camera(rx, ry, focal)
@@ -121,6 +124,7 @@ def test_the_normal_gives_the_angles_back(rx: float, ry: float, focal: float) ->
     assert (opposite.rx_deg, opposite.ry_deg) == pytest.approx((rx, ry), abs=1e-6)
 
 
+@settings(deadline=None)
 @given(st.floats(-60, 60), st.floats(-60, 60), focals, focals)
 def test_under_another_focal_the_straightened_view_changes_by_an_affine_map_only(
     rx: float, ry: float, focal: float, other_focal: float

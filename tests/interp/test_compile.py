@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p3i.grammar.ast import Affine, CameraPose, Coordinate, Draw, For, Header, If, Polar, Program
@@ -108,6 +108,7 @@ RINGS = Program(
 )  # fmt: skip
 
 
+@settings(deadline=None)
 @given(programs())
 def test_the_points_equal_those_of_a_naive_loop(program: Program) -> None:
     expected = np.array(naive(program), dtype=float).reshape(-1, 4)
@@ -116,6 +117,7 @@ def test_the_points_equal_those_of_a_naive_loop(program: Program) -> None:
     np.testing.assert_allclose(pattern.centers().numpy(), expected[:, :2], rtol=1e-11, atol=1e-9)
 
 
+@settings(deadline=None)
 @given(programs())
 def test_the_edges_join_each_point_to_its_successors_once(program: Program) -> None:
     pattern = compile(program)
@@ -129,6 +131,7 @@ def test_the_edges_join_each_point_to_its_successors_once(program: Program) -> N
     assert set(joined) == expected
 
 
+@settings(deadline=None)
 @given(programs())
 def test_theta_holds_the_camera_and_every_number_of_the_draw(program: Program) -> None:
     pattern = compile(program)
@@ -139,6 +142,7 @@ def test_theta_holds_the_camera_and_every_number_of_the_draw(program: Program) -
     assert compile(moved).theta.tolist() == pytest.approx((pattern.theta + 0.5).tolist())
 
 
+@settings(deadline=None)
 @given(programs(), st.lists(st.floats(-1, 1), min_size=20, max_size=20))
 def test_moving_theta_equals_compiling_the_moved_program(program: Program, steps: list[float]) -> None:
     pattern = compile(program)

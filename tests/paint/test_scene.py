@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Polar, Program
@@ -39,6 +39,7 @@ def index_of(program: Program) -> np.ndarray:
     return compile(program).index.numpy().astype(float)
 
 
+@settings(deadline=None)
 @given(st.floats(-60, 60), st.floats(-60, 60), st.floats(-20, 20), st.floats(-20, 20), st.floats(0.5, 10))
 def test_a_dot_is_the_ellipse_that_the_camera_sees_of_a_circle(
     rx: float, ry: float, x: float, y: float, radius: float
@@ -110,6 +111,7 @@ def test_the_spacing_is_that_of_the_closest_neighbours_even_in_a_skew_basis() ->
     assert outlines.pitch(outlines.chart_of(compile(alone))) == outlines.DEFAULT_PITCH
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(*[st.floats(-500, 500)] * 4), min_size=1, max_size=5))
 def test_clipping_keeps_the_part_of_a_line_that_is_on_the_canvas(ends: list[tuple[float, ...]]) -> None:
     size = Size(100, 80)
