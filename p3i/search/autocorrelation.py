@@ -68,9 +68,7 @@ def autocorrelation(view: np.ndarray, weights: np.ndarray) -> Autocorrelation:
     overlap = correlation(cv2.mulSpectrums(of_weights, of_weights, 0, conjB=True))
     judged = (overlap > _LEAST_OVERLAP * overlap[0, 0]) & (norm > _LEAST_OVERLAP * norm[0, 0])
     values = np.where(judged, inner / np.maximum(norm, 1e-6 * max(float(norm[0, 0]), 1e-9)), -1)
-    return Autocorrelation(
-        np.fft.fftshift(values).astype(np.float32), np.fft.fftshift(judged)
-    )
+    return Autocorrelation(np.fft.fftshift(values).astype(np.float32), np.fft.fftshift(judged))
 
 
 def best_pair(found: Autocorrelation, *, least: float, most: float) -> ShiftPair | None:

@@ -70,6 +70,15 @@ def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
     return torch.einsum("nk,nkc->kc", weight, cells.values) / total.clamp(min=1e-6)[:, None], total
 
 
+def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:
+    """Each cell's agreement with the weighted mean of all the others, [N]."""
+    mean, total = mean_cell(cells, weights)
+    own = cells.known * weights[:, None].to(cells.values)
+    rest = (total[None] - own).clamp(min=1e-6)[..., None]
+    others = (mean[None] * total[None, :, None] - own[..., None] * cells.values) / rest
+    return agreement(cells.values, others, cells.known)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contrast:
     """How well each cell is predicted by the others, [N] each.
@@ -102,11 +111,8 @@ def contrast(
     found = Contrast(torch.zeros(len(index)), torch.zeros(len(index)))
     weights = weights.float()
     for _ in range(rounds):
-        mean, total = mean_cell(cells, weights)
-        own = cells.known * weights[:, None]
-        rest = (total[None] - own).clamp(min=1e-6)[..., None]
-        others = (mean[None] * total[None, :, None] - own[..., None] * cells.values) / rest
-        whole = agreement(cells.values, others, cells.known)
+        mean, _ = mean_cell(cells, weights)
+        whole = agreement_with_others(cells, weights)
         half = torch.stack(
             [sum(agreement(c.values, mean[None], c.known) for c in pair) / len(pair) for pair in shifted]
         )

@@ -73,33 +73,34 @@ class Evidence:
     image: Image
     config: SearchConfig
     focal_mm: float
-    _maps: dict[int, FeatureMap] = field(default_factory=dict)
-    _levels: dict[tuple[int, float], Level] = field(default_factory=dict)
+    _maps: dict[tuple[str, int], FeatureMap] = field(default_factory=dict)
+    _levels: dict[tuple[str, int, float], Level] = field(default_factory=dict)
 
-    def features(self, longer: int) -> FeatureMap:
-        """The photo's features with the longer side reduced to `longer` pixels (never enlarged)."""
-        longer = min(longer, self.image.size.longer)
-        if longer not in self._maps:
-            self._maps[longer] = extract(
-                self.image, name=self.config.features, longer=longer, weights=self.config.weights
-            )
-        return self._maps[longer]
+    def features(self, longer: int, *, name: str | None = None) -> FeatureMap:
+        """The photo's features with the longer side reduced to `longer` pixels (never enlarged).
 
-    def level(self, longer: int, *, blur: float) -> Level:
+        `name` asks for other features than those of the search.
+        """
+        key = name or self.config.features, min(longer, self.image.size.longer)
+        if key not in self._maps:
+            self._maps[key] = extract(self.image, name=key[0], longer=key[1], weights=self.config.weights)
+        return self._maps[key]
+
+    def level(self, longer: int, *, blur: float, name: str | None = None) -> Level:
         """The map of that size, blurred by a Gaussian of `blur` map pixels, with its derivatives."""
         # Steps of a factor 2^(1/2) in blur: finer ones would only cost memory.
         step = round(2 * math.log2(max(blur, 0.5))) / 2
-        longer = min(longer, self.image.size.longer)
-        if (longer, step) not in self._levels:
-            self._levels[longer, step] = _level(self, self.features(longer), 2.0**step)
-        return self._levels[longer, step]
+        key = name or self.config.features, min(longer, self.image.size.longer), step
+        if key not in self._levels:
+            self._levels[key] = _level(self, self.features(longer, name=name), 2.0**step)
+        return self._levels[key]
 
-    def level_for(self, cell_px: float, *, finest: bool = False) -> Level:
+    def level_for(self, cell_px: float, *, finest: bool = False, name: str | None = None) -> Level:
         """The map on which cells of `cell_px` photo pixels a side are compared best."""
         scale = min(1.0, COARSE / self.image.size.longer)
         longer = FINE if finest or cell_px * scale < _LEAST_COARSE_CELL else COARSE
         cell = cell_px * min(1.0, longer / self.image.size.longer)
-        return self.level(longer, blur=_BLUR_SHARE * cell)
+        return self.level(longer, blur=_BLUR_SHARE * cell, name=name)
 
 
 def _level(evidence: Evidence, features: FeatureMap, blur: float) -> Level:

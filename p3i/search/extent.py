@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.search.alike import Alike, look_alike, working_size
-from p3i.search.outline import Outline, best_outline
+from p3i.search.outline import Outline, best_outline, rectangle_gain
 from p3i.vision.cells import agreement, shifted
 from p3i.vision.sheet import cell_sides_px, project
 
@@ -23,6 +23,8 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 _SLACK = 0.09  # of a period: how far an object may lie from its place
+_MISSES = (0.04, 0.1, 0.2, 0.35, 0.5)  # shares of objects that do not look like the others
+_STRAYS = (0.02, 0.06, 0.15)  # shares of other things that do
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
 
 
@@ -94,7 +96,23 @@ def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
     box, side = alike.sheet.box, alike.sheet.side
     slack = max(1, round(_SLACK * side))
     near = np.array([(x, y) for x in (-slack, 0, slack) for y in (-slack, 0, slack)])
-    fit = agreement(alike.cells, alike.cells_known, shifted(alike.template, near)).max(axis=1)
+    templates = shifted(alike.template, near)
+    fit = agreement(alike.cells, alike.cells_known, templates).max(axis=1)
+    import os
+
+    k = float(os.environ.get("HALF", "0"))
+    if k:
+        h = side // 2
+        halves = []
+        for part in (np.s_[:h, :], np.s_[h:, :], np.s_[:, :h], np.s_[:, h:]):
+            halves.append(
+                agreement(alike.cells[:, :, *part], alike.cells_known[:, *part], templates[:, :, *part]).max(
+                    axis=1
+                )
+            )
+            lowk = alike.cells_known[:, *part].mean(axis=(1, 2)) < 0.5
+            halves[-1][lowk] = 1
+        fit = (1 - k) * fit + k * np.minimum(fit, np.minimum.reduce(halves))
     visible = alike.visible
     judged = _middle_shows(alike, shape) & (visible > 0.25)
     if not judged.any():
@@ -103,14 +121,23 @@ def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
     others = judged & (alike.weights < 0.1)
     outside_level = float(np.clip(np.median(fit[others]), 0, 0.3)) if others.sum() > 8 else 0.15
     score = (fit - outside_level) / max(inside_level - outside_level, 0.05)
-    passes = (judged & (score > 0.5)).reshape(box.rows, box.columns)
-    region = cv2.morphologyEx(np.pad(passes.astype(np.uint8), 3), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    region = cv2.morphologyEx(region, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))[3:-3, 3:-3].ravel() > 0
-    misses = _share(score[judged & region] <= 0.5, 0.05, low=0.03, high=0.5)
-    strays = _share(score[judged & ~region] > 0.5, 0.05, low=0.02, high=0.3)
-    worst, best = np.log(misses / (1 - strays)), np.log((1 - misses) / strays)
-    trust = np.clip((score - 0.3) / 0.4, 0, 1)
-    return np.where(judged, (worst + (best - worst) * trust) * np.sqrt(visible), 0.0)
+    lo, hi = (float(v) for v in os.environ.get("RAMP", ".3,.7").split(","))
+    passes = np.clip((score - lo) / (hi - lo), 0, 1)
+    trust = judged * np.sqrt(visible)
+
+    def evidence(misses: float, strays: float) -> Array:
+        worst, best = np.log(misses / (1 - strays)), np.log((1 - misses) / strays)
+        return (worst + (best - worst) * passes) * trust
+
+    def support(misses: float, strays: float) -> float:
+        """Log-likelihood of all cells, with the pattern filling the rectangle that suits it best."""
+        without = float((trust * (passes * np.log(strays) + (1 - passes) * np.log(1 - strays))).sum())
+        return without + rectangle_gain(evidence(misses, strays).reshape(box.rows, box.columns))
+
+    rates = max(((m, s) for m in _MISSES for s in _STRAYS), key=lambda rate: support(*rate))
+    if os.environ.get("VERB"):
+        print(rates, end=" ")
+    return evidence(*rates)
 
 
 def _share(hits: NDArray[np.bool_], prior: float, *, low: float, high: float) -> float:

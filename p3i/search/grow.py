@@ -81,16 +81,16 @@ def measure(
     return Fit(theta, index, found.contrast, share, score)
 
 
-def grow(evidence: Evidence, pattern: Pattern, proposal: Proposal, *, generator: torch.Generator) -> Fit | None:
+def grow(
+    evidence: Evidence, pattern: Pattern, proposal: Proposal, *, generator: torch.Generator
+) -> Fit | None:
     """Refine a proposal and follow it as far as the pattern goes; None where there is nothing to follow."""
     start = _seed(evidence, pattern, proposal)
     if start is None:
         return None
     theta, selected, weights = start
-    level = evidence.level_for(_cell(evidence, pattern, theta))
-    theta = refine(
-        level, pattern, theta, index=selected, weights=weights, fixed=PHASE, samples=_SAMPLES
-    )
+    level = evidence.level_for(side_of_cell(evidence, pattern, theta))
+    theta = refine(level, pattern, theta, index=selected, weights=weights, fixed=PHASE, samples=_SAMPLES)
     return follow(evidence, pattern, theta, selected, generator=generator, rounds=_ROUNDS)
 
 
@@ -110,7 +110,7 @@ def follow(
     for turn in range(rounds):
         if not _sane(pattern, theta):
             break
-        level = evidence.level_for(_cell(evidence, pattern, theta), finest=finest)
+        level = evidence.level_for(side_of_cell(evidence, pattern, theta), finest=finest)
         fit = measure(level, pattern, theta, start=selected)
         if fit is None:
             break
@@ -132,14 +132,12 @@ def follow(
     return best
 
 
-def _seed(
-    evidence: Evidence, pattern: Pattern, proposal: Proposal
-) -> tuple[Tensor, Tensor, Tensor] | None:
+def _seed(evidence: Evidence, pattern: Pattern, proposal: Proposal) -> tuple[Tensor, Tensor, Tensor] | None:
     """Where to start: theta, cells [N, 2] and their weights [N]."""
     if proposal.local:
         return _local_seed(evidence, pattern, proposal)
     theta = proposal.lattice.reduced().theta(pattern)
-    level = evidence.level_for(_cell(evidence, pattern, theta))
+    level = evidence.level_for(side_of_cell(evidence, pattern, theta))
     index = cells_in_view(level, pattern, theta)
     if len(index) < _FEWEST:
         return None
@@ -157,7 +155,7 @@ def _local_seed(
 ) -> tuple[Tensor, Tensor, Tensor] | None:
     """The tilt under which the neighbourhood of a local proposal agrees best, and its middle cells."""
     flat = proposal.lattice.theta(pattern)
-    level = evidence.level_for(_cell(evidence, pattern, flat))
+    level = evidence.level_for(side_of_cell(evidence, pattern, flat))
     steps = torch.arange(-3, 4, dtype=torch.float64)
     index = torch.cartesian_prod(steps, steps)
     near = index.abs().amax(1) <= 1
@@ -267,7 +265,8 @@ def _sample_of(count: int, generator: torch.Generator) -> Tensor:
     return torch.randperm(count, generator=generator)[:_MOST_REFINED].sort().values
 
 
-def _cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:
+def side_of_cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:
+    """The side of the cell at the origin, in photo pixels."""
     return cell_px(evidence.level(320, blur=0.5), pattern, theta)
 
 

@@ -44,9 +44,7 @@ class Lattice:
     def of(cls, pattern: Pattern, theta: Tensor) -> "Lattice":
         """The lattice that the numbers theta [P] of the lattice sketch mean."""
         value = dict(zip(pattern.paths, theta.tolist(), strict=True))
-        basis = np.array(
-            [[value["draw.x.i"], value["draw.y.i"]], [value["draw.x.j"], value["draw.y.j"]]]
-        )
+        basis = np.array([[value["draw.x.i"], value["draw.y.i"]], [value["draw.x.j"], value["draw.y.j"]]])
         origin = np.array([value["draw.x.1"], value["draw.y.1"]])
         return cls(value["camera.rx"], value["camera.ry"], basis, origin)
 

@@ -65,6 +65,7 @@ def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outl
                 break
             outline = step
             found.append(outline)
+    found += [_improved(worth, i, j, _bounds(evidence > 0), guards) for guards in _diamonds(worth, i, j)]
     best = max(found, key=lambda outline: outline.gain)
     best = _without_idle_guards(worth, i, j, best)
     i0, i1, j0, j1 = *best.i_range, *best.j_range
@@ -74,6 +75,12 @@ def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outl
         tuple(sorted((a, b, c + a * i_start + b * j_start) for a, b, c in best.guards)),
         best.gain,
     )
+
+
+def rectangle_gain(evidence: Array) -> float:
+    """The greatest sum of evidence over a rectangle of cells, 0 for none."""
+    i0, i1, j0, j1 = _best_rectangle(evidence)
+    return max(0.0, float(evidence[j0:j1, i0:i1].sum()))
 
 
 def _best_rectangle(worth: Array) -> tuple[int, int, int, int]:
@@ -173,6 +180,12 @@ def _with_one_more(worth: Array, i: Array, j: Array, outline: Outline) -> Outlin
             if best is None or tried.gain > best.gain:
                 best = tried
     return best if best is not None and best.gain > outline.gain else None
+
+
+def _diamonds(worth: Array, i: Array, j: Array) -> list[tuple[tuple[int, int, int], ...]]:
+    """Triples of diagonal guards, each at its own best place: no guard alone gains much on a diamond."""
+    sides = [(a, b, _best_threshold(worth, a * i + b * j)) for a in (-1, 1) for b in (-1, 1)]
+    return [tuple(side for side in sides if side is not left_out) for left_out in sides]
 
 
 def _without_idle_guards(worth: Array, i: Array, j: Array, outline: Outline) -> Outline:

@@ -40,7 +40,9 @@ class Instances:
     lead: Tensor
 
 
-def find_instances(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, weights: Tensor) -> Instances:
+def find_instances(
+    level: Level, pattern: Pattern, theta: Tensor, index: Tensor, weights: Tensor
+) -> Instances:
     """Search around each cell of `index` [N, 2] for the mean cell; `weights` [N] make that mean.
 
     A cell takes no part in the mean that it is compared with.

@@ -121,7 +121,9 @@ class _Views:
         self._level = level
         self._focal_mm = focal_mm
 
-    def __call__(self, rx_deg: float, ry_deg: float) -> tuple[np.ndarray, np.ndarray, float, np.ndarray] | None:
+    def __call__(
+        self, rx_deg: float, ry_deg: float
+    ) -> tuple[np.ndarray, np.ndarray, float, np.ndarray] | None:
         """The view under a pose: features, weights, program units a pixel, and its middle on the plane."""
         level = self._level
         map_from_plane = (

@@ -1,0 +1,199 @@
+"""Lattices on a photo: proposals, growth, the primitive cell, phase and extent, in this order."""
+
+import numpy as np
+from torch import Tensor
+
+from p3i.interp.pattern import Pattern
+from p3i.search.evidence import Evidence
+from p3i.search.grow import Fit, follow, grow
+from p3i.search.lattice import Lattice, lattice_pattern, map_from_index
+from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit, strict_layout
+from p3i.search.primitive import primitive
+from p3i.search.propose.lattice import Proposal, straightened_proposals, window_proposals
+from p3i.search.result import StopReason
+from p3i.search.session import Answer, Session
+
+# So many proposals of each kind are looked at, and so many fits that differ are grown in all.
+_MOST_PROPOSALS = 10
+_MOST_GROWN = 7
+# Fits of this worth are certain enough that only a better one could matter; after two more tries without
+# one the search goes on to finish it.
+_CERTAIN = 0.05
+_TRIES_WHEN_CERTAIN = 2
+# A runner-up is finished too where its worth is at least this share of the best.
+_RIVAL = 0.5
+# A pattern of n cells counts as if it had _FEW_CELLS fewer: the numbers and the mean cell take their part.
+_FEW_CELLS = 10
+_LAST_ROUNDS = 4
+
+
+def find_lattices(session: Session) -> list[Answer]:
+    """The lattices of a photo as finished programs, the most worth first."""
+    pattern = lattice_pattern()
+    fits: list[Fit] = []
+    try:
+        _grow_all(session, pattern, fits)
+    except KeyboardInterrupt:
+        session.stopped = StopReason.INTERRUPTED
+    fits.sort(key=lambda fit: -worth(fit))
+    wanted = max(2, session.config.top)
+    answers: list[Answer] = []
+    finished: list[Fit] = []
+    for fit in fits:
+        if len(finished) >= wanted or (finished and worth(fit) < _RIVAL * worth(fits[0])):
+            break
+        if any(_same(session.evidence, pattern, fit, other) for other in finished):
+            continue
+        if finished and not session.go_on():
+            break
+        session.tell("reading off the objects", 0.8 + 0.1 * len(finished))
+        finished.append(fit)
+        answer = _finished(session, pattern, fit)
+        if answer is not None:
+            answers.append(answer)
+    return sorted(answers, key=lambda answer: -answer.worth)
+
+
+def worth(fit: Fit) -> float:
+    """How much of the photo a fit explains, less what few cells explain by chance."""
+    count = int(fit.support.sum())
+    return fit.score * max(0.0, 1 - _FEW_CELLS / max(count, 1)) + 1e-3 * fit.score
+
+
+def _grow_all(session: Session, pattern: Pattern, fits: list[Fit]) -> None:
+    """Grow the proposals, the promising ones first and none twice; the fits go into `fits`."""
+    session.tell("looking through windows", 0.02)
+    windows = window_proposals(session.evidence)[:_MOST_PROPOSALS]
+    session.tell("straightening", 0.1)
+    views = straightened_proposals(session.evidence)[:_MOST_PROPOSALS]
+    grown = idle = 0
+    for proposal in _alternating(views, windows):
+        if not session.go_on() or grown >= _MOST_GROWN:
+            return
+        if any(_explained(session.evidence, pattern, proposal, fit) for fit in fits):
+            continue
+        session.tell("refining", 0.3 + 0.5 * grown / _MOST_GROWN)
+        fit = grow(session.evidence, pattern, proposal, generator=session.generator)
+        grown += 1
+        _record(session, pattern, proposal, fit)
+        if fit is None or int(fit.support.sum()) < 4:
+            continue
+        better = worth(fit) > max((worth(other) for other in fits), default=0.0)
+        fits.append(fit)
+        certain = max(worth(other) for other in fits) > _CERTAIN
+        idle = 0 if better else idle + 1
+        if certain and idle >= _TRIES_WHEN_CERTAIN:
+            return
+
+
+def _alternating(first: list[Proposal], second: list[Proposal]) -> list[Proposal]:
+    """The two lists merged, one of each in turn."""
+    merged = []
+    for place in range(max(len(first), len(second))):
+        merged += first[place : place + 1] + second[place : place + 1]
+    return merged
+
+
+def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
+    """The last refinement on the fine map, the primitive cell, phase and extent, and the score."""
+    evidence = session.evidence
+    # The middle of the support is where cells are measured and where the index starts.
+    middle = fit.index[fit.support].median(0).values
+    theta = Lattice.of(pattern, fit.theta).moved_to(middle.numpy()).theta(pattern)
+    selected = fit.index[fit.support] - middle
+    last = follow(
+        evidence, pattern, theta, selected, generator=session.generator, rounds=_LAST_ROUNDS, finest=True
+    )
+    if last is None or int(last.support.sum()) < 4:
+        return None
+    theta, ground = primitive(evidence, pattern, last) or (last.theta, last.index[last.support])
+    layout = found_layout(evidence, Lattice.of(pattern, theta), ground)
+    if layout is None:
+        return None
+    return _answer(session, pattern, layout)
+
+
+def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None:
+    """The program of a layout with its score, under the options that change what is drawn."""
+    measured = layout_fit(session.evidence, pattern, layout)
+    if measured is None:
+        return None
+    count = len(measured.index)
+    score = float(measured.contrast.clamp(min=0).mean()) * max(0.0, 1 - 4 / count)
+    if session.config.extent == "image":
+        layout = filling_layout(session.evidence, pattern, layout)
+    notes: tuple[str, ...] = ()
+    if session.config.strict:
+        layout, moved = strict_layout(layout)
+        pixels = moved * session.evidence.image.size.unit_px
+        notes = (f"Table 1 has no constants: the objects lie {pixels:.1f} pixels from the free fit",)
+    session.record("answer", cells=count, score=score, worth=worth(measured))
+    return Answer(layout.program(), "lattice", score, worth(measured), notes)
+
+
+def _explained(evidence: Evidence, pattern: Pattern, proposal: Proposal, fit: Fit) -> bool:
+    """Whether a fit holds the proposal's lattice already, or one that it is part of."""
+    if worth(fit) < 0.3 * _CERTAIN:
+        return False
+    level = evidence.level_for(100.0)
+    wide = proposal.lattice.theta(pattern)
+    if not proposal.local:
+        at = level.map_from_plane(pattern, fit.theta).numpy() @ [*Lattice.of(pattern, fit.theta).origin, 1.0]
+    else:
+        at = level.map_from_plane(pattern, wide).numpy() @ [*proposal.lattice.origin, 1.0]
+        cell = np.linalg.inv(_index_to_map(evidence, pattern, fit)) @ (at / at[2])
+        away = (fit.index[fit.support].numpy() - cell[:2] / cell[2]).astype(float)
+        if len(away) == 0 or np.abs(away).max(1).min() > 1.0:
+            return False
+    point = at[:2] / at[2]
+    ours = _steps_at(_index_to_map(evidence, pattern, fit), point)
+    theirs = _steps_at(_matrix(evidence, pattern, wide), point)
+    return _whole_multiple(theirs, ours) or _whole_multiple(ours, theirs)
+
+
+def _same(evidence: Evidence, pattern: Pattern, fit: Fit, other: Fit) -> bool:
+    """Whether two fits mean one lattice, or one a multiple of the other."""
+    middle = np.array([*fit.index[fit.support].median(0).values.tolist(), 1.0])
+    at = _index_to_map(evidence, pattern, fit) @ middle
+    point = at[:2] / at[2]
+    a = _steps_at(_index_to_map(evidence, pattern, fit), point)
+    b = _steps_at(_index_to_map(evidence, pattern, other), point)
+    return _whole_multiple(a, b) or _whole_multiple(b, a)
+
+
+def _matrix(evidence: Evidence, pattern: Pattern, theta: Tensor) -> np.ndarray:
+    return map_from_index(evidence.level_for(100.0), pattern, theta)
+
+
+def _index_to_map(evidence: Evidence, pattern: Pattern, fit: Fit) -> np.ndarray:
+    return _matrix(evidence, pattern, fit.theta)
+
+
+def _steps_at(matrix: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """The steps of i and j in map pixels (as columns) at a map point, under index -> map `matrix`."""
+    back = np.linalg.inv(matrix) @ [*point, 1.0]
+    depth = matrix[2] @ (back / back[2])
+    return (matrix[:2, :2] - np.outer(point, matrix[2, :2])) / depth
+
+
+def _whole_multiple(steps: np.ndarray, of: np.ndarray) -> bool:
+    """Whether the steps (columns) are whole combinations of others, to within a seventh of a step."""
+    ratio = np.linalg.solve(of, steps)
+    whole = np.round(ratio)
+    return bool(np.abs(ratio - whole).max() < 0.15 and abs(np.linalg.det(whole)) >= 0.5)
+
+
+def _record(session: Session, pattern: Pattern, proposal: Proposal, fit: Fit | None) -> None:
+    if session.trace is None:
+        return
+    lattice = proposal.lattice
+    session.record(
+        "proposal", rx=lattice.rx_deg, ry=lattice.ry_deg, basis=lattice.basis.tolist(),
+        origin=lattice.origin.tolist(), worth=proposal.worth, local=proposal.local,
+    )  # fmt: skip
+    if fit is not None:
+        found = Lattice.of(pattern, fit.theta)
+        session.record(
+            "fit", rx=found.rx_deg, ry=found.ry_deg, basis=found.basis.tolist(), origin=found.origin.tolist(),
+            cells=fit.index[fit.support].int().tolist(), score=fit.score, worth=worth(fit),
+        )  # fmt: skip

@@ -1,0 +1,72 @@
+"""One search of one photo: what all its parts share, and what they find."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import torch
+
+from p3i.grammar.ast import Program
+from p3i.search.config import SearchConfig
+from p3i.search.evidence import Evidence
+from p3i.search.result import StopReason, StructureFound
+
+Progress = Callable[[str, float], None]
+Trace = Callable[[Mapping[str, Any]], None]
+
+
+@dataclass(slots=True)
+class Session:
+    """The photo's evidence, the options, the clock, and where progress and steps are told.
+
+    `stopped` says why the search was cut short, if it was; who proposes and refines looks at `go_on()` in
+    between, and then finishes what it has.
+    """
+
+    evidence: Evidence
+    config: SearchConfig
+    progress: Progress | None = None
+    trace: Trace | None = None
+    stopped: StopReason | None = None
+    _begun: float = field(default_factory=time.monotonic)
+    _generator: torch.Generator | None = None
+
+    @property
+    def generator(self) -> torch.Generator:
+        """The one source of chance, seeded by the options."""
+        if self._generator is None:
+            self._generator = torch.Generator().manual_seed(self.config.seed)
+        return self._generator
+
+    def go_on(self) -> bool:
+        """Whether there is time left; once not, `stopped` says so."""
+        limit = self.config.time_s
+        if self.stopped is None and limit is not None and time.monotonic() - self._begun > limit:
+            self.stopped = StopReason.TIME_UP
+        return self.stopped is None
+
+    def tell(self, doing: str, share: float) -> None:
+        """Report progress: what is being done, and the share of the whole that is done, 0..1."""
+        if self.progress is not None:
+            self.progress(doing, share)
+
+    def record(self, step: str, **facts: Any) -> None:
+        """Write one step of the search into the trace."""
+        if self.trace is not None:
+            self.trace({"step": step, **facts})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """A finished program for the photo.
+
+    `score` says how sure it is (0..1, comparable between photos), `worth` how much of this photo it explains
+    (comparable between programs for one photo).
+    """
+
+    program: Program
+    structure: StructureFound
+    score: float
+    worth: float
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,24 @@
+"""The pattern families that the search knows: a structure, and the function that finds its programs.
+
+A newcomer adds a line here. What a family's function shares with the others: `Session` (evidence, options,
+clock), cells in index space (cells.py), their refinement through the compiled generator (refine.py,
+register.py), and `Answer`, whose scores are comparable between families.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from p3i.search.lattices import find_lattices
+from p3i.search.result import StructureFound
+from p3i.search.session import Answer, Session
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """A kind of pattern: its name, and how its programs are found on a photo, the most worth first."""
+
+    structure: StructureFound
+    find: Callable[[Session], list[Answer]]
+
+
+FAMILIES: tuple[Family, ...] = (Family("lattice", find_lattices),)

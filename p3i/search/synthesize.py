@@ -1,0 +1,128 @@
+"""Photo -> program: the whole search, from what may be looked at to the answer or the reason for none."""
+
+import numpy as np
+import torch
+
+from p3i.grammar.ast import Program
+from p3i.interp import unroll
+from p3i.interp.camera import Camera, project
+from p3i.search.config import SearchConfig
+from p3i.search.evidence import FINE, Evidence
+from p3i.search.result import Candidate, FocalSource, StopReason, SynthesisResult
+from p3i.search.session import Answer, Progress, Session, Trace
+from p3i.search.sketches import FAMILIES
+from p3i.vision.image import Image
+from p3i.vision.threads import limit_threads
+
+NEEDED = 0.25
+"""The score that an answer must reach (docs/benchmarks.md says what it was calibrated on)."""
+
+# Pictures below this many pixels a side, or with less than this share known, are not searched.
+_LEAST_SIDE = 32
+_LEAST_KNOWN = 0.1
+# The spread of grey levels (0..1) below which a picture is flat.
+_LEAST_SPREAD = 0.004
+
+
+def synthesize(
+    image: Image,
+    config: SearchConfig,
+    *,
+    progress: Progress | None = None,
+    trace: Trace | None = None,
+) -> SynthesisResult:
+    """Find the camera and the program of the pattern on a photo.
+
+    The result's `program` is None where nothing reaches the score NEEDED; then `stop` and `score` say why.
+    The program has no header yet. A KeyboardInterrupt ends the search with the best that was found.
+    """
+    limit_threads(config.threads)
+    focal_mm, focal_source = focal_of(image, config)
+
+    def result(program: Program | None, stop: StopReason, **more: object) -> SynthesisResult:
+        return SynthesisResult(
+            program=program,
+            stop=stop,
+            focal_mm=focal_mm,
+            focal_source=focal_source,
+            features=config.features,
+            seed=config.seed,
+            **more,  # pyright: ignore[reportArgumentType]
+        )
+
+    hopeless = _hopeless(image)
+    if hopeless is not None:
+        return result(None, hopeless)
+    session = Session(Evidence(image, config, focal_mm), config, progress, trace)
+    answers: list[Answer] = []
+    try:
+        for family in FAMILIES:
+            if config.structure in ("auto", family.structure):
+                answers += family.find(session)
+    except KeyboardInterrupt:
+        session.stopped = StopReason.INTERRUPTED
+    answers.sort(key=lambda answer: -answer.worth)
+    good = [answer for answer in answers if answer.score >= NEEDED]
+    if not good:
+        best = max((answer.score for answer in answers), default=0.0)
+        return result(None, session.stopped or StopReason.NO_PATTERN, score=best, needed=NEEDED)
+    first = good[0]
+    margin = first.worth - max((answer.worth for answer in answers if answer is not first), default=0.0)
+    session.tell("done", 1.0)
+    return result(
+        first.program,
+        session.stopped or StopReason.FOUND,
+        structure=first.structure,
+        score=first.score,
+        margin=margin / max(first.worth, 1e-9),
+        needed=NEEDED,
+        candidates=tuple(
+            Candidate(program=answer.program, score=answer.score, structure=answer.structure)
+            for answer in good[: config.top]
+        ),
+        centers=centers_px(first.program, image, focal_mm),
+        notes=first.notes,
+    )
+
+
+def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
+    """The focal that is assumed, and why: the option, the photo's EXIF data, or 35 mm."""
+    if config.focal_mm is not None:
+        return config.focal_mm, "option"
+    if image.focal_mm is not None:
+        return image.focal_mm, "exif"
+    return 35.0, "default"
+
+
+def centers_px(program: Program, image: Image, focal_mm: float) -> tuple[tuple[float, float, int, int], ...]:
+    """The program's objects on the photo: (x, y) in pixels and (i, j); those outside the frame left out."""
+    points = unroll.points(program)
+    if not points:
+        return ()
+    camera = Camera.of(program, focal_mm=focal_mm)
+    plane = torch.tensor([point[:2] for point in points], dtype=torch.float64)
+    pixels, in_front = project(camera.image_from_plane(image.size), plane)
+    inside = (
+        in_front
+        & (pixels >= -0.5).all(1)
+        & (pixels[:, 0] <= image.size.width - 0.5)
+        & (pixels[:, 1] <= image.size.height - 0.5)
+    )
+    return tuple(
+        (float(pixels[place, 0]), float(pixels[place, 1]), *points[place][2:])
+        for place in unroll.distinct(points)
+        if bool(inside[place])
+    )
+
+
+def _hopeless(image: Image) -> StopReason | None:
+    """Why a picture is not worth a search, if so."""
+    if min(image.size.width, image.size.height) < _LEAST_SIDE:
+        return StopReason.TOO_SMALL
+    if float(image.valid.mean()) < _LEAST_KNOWN:
+        return StopReason.TOO_LITTLE_KNOWN
+    step = max(1, image.size.longer // FINE)
+    grey = image.pixels[::step, ::step].mean(2)[image.valid[::step, ::step]]
+    if len(grey) == 0 or float(np.std(grey)) < _LEAST_SPREAD:
+        return StopReason.FLAT
+    return None
