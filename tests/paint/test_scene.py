@@ -123,7 +123,7 @@ def test_clipping_keeps_the_part_of_a_line_that_is_on_the_canvas(ends: list[tupl
         seen = ((walked >= 0) & (walked <= (99, 79))).all(axis=1)
         for point in walked[seen]:
             along = kept[:, 1] - kept[:, 0]
-            share = ((point - kept[:, 0]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-9)
+            share = ((point - kept[:, 0]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-200)
             foot = kept[:, 0] + np.clip(share, 0, 1)[:, None] * along
             assert np.linalg.norm(point - foot, axis=1).min() < 1e-6
 
