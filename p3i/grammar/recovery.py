@@ -200,30 +200,37 @@ def _explain_word(problem: Stopped, piece: Piece) -> Diagnostic:
         return _unfinished(tokens, statement, expected)
     span = span_of(token)
     position = next(place for place, other in enumerate(tokens) if other is token)
-    before = tokens[position - 1] if position else None
     if str(token) in _WORD_HELP:
         return error("P114", f"the language has no `{token}`", span, help=_WORD_HELP[str(token)])
-    if (
-        before is not None
-        and "TIMES" in expected
-        and token.type in {"NAME", "NUMBER", "LPAR", "COS", "SIN", "HOLE"}
-    ):
-        together = Span(span_of(before).start, span.end)
-        if before.type == "NAME" and before not in {"i", "j"} and token.type == "LPAR":
-            help = "the functions are `Cos(...)` and `Sin(...)`"
-            return error(
-                "P107", f"`{_quote(before)}` is not a function of the language", span_of(before), help=help
-            )
-        if before.type == "NUMBER" and token.type == "NAME" and token not in {"i", "j"}:
-            help = "numbers are written like `12`, `1.5` or `1e-3`"
-            return error("P109", f"`{_quote(before)}{_quote(token)}` is not a number", together, help=help)
-        message = f"an operator is missing between `{_quote(before)}` and `{_quote(token)}`"
-        return error("P101", message, together, help=f"write `{_quote(before)}*{_quote(token)}`")
-    if token.type == "EQUAL" and tokens[0].type == "IF":
-        help = "write `>=` or `<=`"
-        return error("P114", "a guard does not compare with `=`", span, help=help)
+    if tokens[0].type == "IF" and token.type == "EQUAL":
+        return error("P114", "a guard does not compare with `=`", span, help="write `>=` or `<=`")
+    if tokens[0].type == "IF" and token.type in {"GE", "LE"}:
+        help = "write two guards joined by `and`, as in `i >= 0 and i <= 3`"
+        return error("P114", "a guard compares once", span, help=help)
+    if "TIMES" in expected and token.type in {"NAME", "NUMBER", "LPAR", "COS", "SIN", "HOLE"}:
+        return _missing_between(tokens[position - 1], token, after=tokens[position + 1 : position + 2])
+    if _unclosed(tokens[:position], OPENING, CLOSING) is None:
+        expected -= {"RPAR"}
     message = f"`{_quote(token)}` cannot stand here"
     return error("P101", message, span, label=_wanted(expected), help=_EXAMPLES[statement])
+
+
+def _missing_between(before: Token, token: Token, *, after: Sequence[Token]) -> Diagnostic:
+    """Two values side by side: an operator is missing, or a comma, or they are one misspelt thing."""
+    together = Span(span_of(before).start, span_of(token).end)
+    touching = span_of(before).end == span_of(token).start
+    if before.type == "NAME" and before not in {"i", "j"} and token.type == "LPAR":
+        message = f"`{_quote(before)}` is not a function of the language"
+        return error("P107", message, span_of(before), help="the functions are `Cos(...)` and `Sin(...)`")
+    misspelt = token.type == "NUMBER" or (token.type == "NAME" and token not in {"i", "j"})
+    if touching and before.type == "NUMBER" and misspelt:
+        message = f"`{_quote(before)}{_quote(token)}` is not a number"
+        return error("P109", message, together, help="numbers are written like `12`, `1.5` or `1e-3`")
+    if after and after[0].type == "EQUAL":
+        message = f"a `,` is missing before `{_quote(token)}`"
+        return error("P101", message, together, help=f"write `{_quote(before)}, {_quote(token)}=`")
+    message = f"an operator is missing between `{_quote(before)}` and `{_quote(token)}`"
+    return error("P101", message, together, help=f"write `{_quote(before)}*{_quote(token)}`")
 
 
 _EXAMPLES = {
@@ -282,6 +289,8 @@ def _wanted(expected: frozenset[str]) -> str | None:
         names = ["a number"]
     if not names:
         return None
+    if len(names) > 1 and names[-1] == _SHOWN["$END"]:
+        names.pop()
     return f"expected {' or '.join(names[:3])}"
 
 
