@@ -22,6 +22,17 @@ Mask = NDArray[np.bool_]
 _LONGER_SIDE = 640  # the photo is worked on at this size
 _SAMPLES = 250_000  # of a sheet, at most about this many
 _ROUNDS = 6
+_LEAST_SECOND, _SECOND_SHARE = 5, 0.08  # cells of a second kind: at least so many, and of the first's number
+_LEAST_LEVEL = 0.45  # agreement of a second kind's cells with their mean
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of cell: its mean features [C, side, side], and how far each cell [N] is of it, 0..1."""
+
+    template: Floats
+    weights: Floats
+    level: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +41,7 @@ class Alike:
 
     `template` [C, side, side] is the mean feature cell, `fit` [N] each cell's agreement with it, `weights`
     [N] in 0..1 how far it is taken for a part of the pattern, `level` the agreement of a typical one.
+    `second` is the other kind of cell that the pattern holds, if it does (stones on a board's lines).
     `colour_share` in 0..1 says how well colours repeat (0 where neighbours swap them, as on a chessboard
     read square by square).
     """
@@ -44,12 +56,19 @@ class Alike:
     fit: Floats
     weights: Floats
     level: float
+    second: Kind | None
     colour_share: float
 
     @property
     def visible(self) -> Floats:
         """The share of each cell [N] that is known."""
         return self.cells_known.mean(axis=(1, 2), dtype=np.float32)
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The one or two kinds of cell, the common one first."""
+        first = Kind(self.template, self.weights, self.level)
+        return (first,) if self.second is None else (first, self.second)
 
 
 def working_size(pixels: Floats, valid: Mask, image_from_plane: Array) -> tuple[Floats, Mask, Array]:
@@ -101,6 +120,7 @@ def look_alike(
     if support is not None:
         weights *= 0.1 + 0.9 * _support_of_cells(support, image_from_cells, sheet)
     template, fit, weights, level = _agreed_cell(cells, cells_known, weights)
+    second = _second_kind(cells, cells_known, weights, fit / max(level, 1e-6), (box.rows, box.columns))
     return Alike(
         image_from_cells,
         sheet,
@@ -112,6 +132,7 @@ def look_alike(
         fit,
         weights,
         level,
+        second,
         colour_share,
     )
 
@@ -142,6 +163,50 @@ def _agreed_cell(cells: Floats, known: Mask, weights: Floats) -> tuple[Floats, F
         weights = np.clip((fit / level - 0.4) / 0.6, 0, 1) * visible * shown
         template = weighted_mean(cells, known, weights)
     return template, fit, weights, level
+
+
+def _second_kind(
+    cells: Floats, known: Mask, weights: Floats, score: Floats, grid: tuple[int, int]
+) -> Kind | None:
+    """Another kind of cell, alike among themselves, in gaps of the pattern; None where there is none.
+
+    Only cells with parts of the pattern on both sides of them, along a row or a column, may found it, so
+    that the border of a board is not taken for a kind.
+    """
+    inside = _between(weights.reshape(grid) > 0.5).ravel()
+    gaps = np.flatnonzero(inside & (score < 0.4) & (known.mean(axis=(1, 2)) > 0.9))
+    least = max(_LEAST_SECOND, _SECOND_SHARE * float(weights.sum()))
+    if len(gaps) < least:
+        return None
+    gaps = gaps[np.linspace(0, len(gaps) - 1, min(len(gaps), 300)).astype(int)]
+    flat = cells[gaps].reshape(len(gaps), -1)
+    size = np.linalg.norm(flat, axis=1)
+    near = (flat @ flat.T) / np.maximum(np.outer(size, size), 1e-6)
+    seed = np.clip(near - 0.3, 0, None).sum(axis=1).argmax()
+    chosen = np.clip(near[seed] - 0.3, 0, None).astype(np.float32)
+    own, level = weighted_mean(cells[gaps], known[gaps], chosen), 0.0
+    for _ in range(_ROUNDS):
+        fit = agreement(cells[gaps], known[gaps], own[None])[:, 0].clip(0, None)
+        level = float((chosen * fit).sum() / max(float(chosen.sum()), 1e-6))
+        if level < _LEAST_LEVEL:
+            return None
+        chosen = np.clip((fit / level - 0.4) / 0.6, 0, 1)
+        own = weighted_mean(cells[gaps], known[gaps], chosen)
+    if chosen.sum() < least:
+        return None
+    all_weights = np.zeros(len(cells), np.float32)
+    all_weights[gaps] = chosen
+    return Kind(own, all_weights, level)
+
+
+def _between(passes: Mask) -> Mask:
+    """Cells [R, C] with passes on both sides of them along their row or their column."""
+    result = np.zeros_like(passes)
+    for axis in (0, 1):
+        before = np.cumsum(passes, axis=axis)
+        after = np.flip(np.cumsum(np.flip(passes, axis), axis=axis), axis)
+        result |= (before >= 2) & (after >= 2)
+    return result
 
 
 def _self_agreement(values: Floats, known: Mask, side: int) -> tuple[Floats, Floats]:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.search.alike import Alike, look_alike, working_size
+from p3i.search.alike import Alike, Kind, look_alike, working_size
 from p3i.search.outline import Outline, best_outline, rectangle_gain
 from p3i.vision.cells import agreement, shifted
 from p3i.vision.sheet import cell_sides_px, project
@@ -23,8 +23,10 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 _SLACK = 0.09  # of a period: how far an object may lie from its place
+_FAILS, _PASSES = 0.3, 0.7  # of the scaled agreement: below no object, above surely one
 _MISSES = (0.04, 0.1, 0.2, 0.35, 0.5)  # shares of objects that do not look like the others
 _STRAYS = (0.02, 0.06, 0.15)  # shares of other things that do
+_LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
 
 
@@ -93,36 +95,12 @@ def _middle_shows(alike: Alike, shape: tuple[int, int]) -> Mask:
 
 def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
     """Log-odds [N] that each cell holds an object."""
-    box, side = alike.sheet.box, alike.sheet.side
-    slack = max(1, round(_SLACK * side))
-    near = np.array([(x, y) for x in (-slack, 0, slack) for y in (-slack, 0, slack)])
-    templates = shifted(alike.template, near)
-    fit = agreement(alike.cells, alike.cells_known, templates).max(axis=1)
-    import os
-
-    k = float(os.environ.get("HALF", "0"))
-    if k:
-        h = side // 2
-        halves = []
-        for part in (np.s_[:h, :], np.s_[h:, :], np.s_[:, :h], np.s_[:, h:]):
-            halves.append(
-                agreement(alike.cells[:, :, *part], alike.cells_known[:, *part], templates[:, :, *part]).max(
-                    axis=1
-                )
-            )
-            lowk = alike.cells_known[:, *part].mean(axis=(1, 2)) < 0.5
-            halves[-1][lowk] = 1
-        fit = (1 - k) * fit + k * np.minimum(fit, np.minimum.reduce(halves))
-    visible = alike.visible
-    judged = _middle_shows(alike, shape) & (visible > 0.25)
+    box, visible = alike.sheet.box, alike.visible
+    judged = _middle_shows(alike, shape) & (visible > _LEAST_VISIBLE)
     if not judged.any():
-        return np.zeros(len(fit))
-    inside_level = float(np.average(fit, weights=alike.weights + 1e-9))
-    others = judged & (alike.weights < 0.1)
-    outside_level = float(np.clip(np.median(fit[others]), 0, 0.3)) if others.sum() > 8 else 0.15
-    score = (fit - outside_level) / max(inside_level - outside_level, 0.05)
-    lo, hi = (float(v) for v in os.environ.get("RAMP", ".3,.7").split(","))
-    passes = np.clip((score - lo) / (hi - lo), 0, 1)
+        return np.zeros(box.count)
+    score = np.maximum.reduce([_score(alike, kind, judged) for kind in alike.kinds])
+    passes = np.clip((score - _FAILS) / (_PASSES - _FAILS), 0, 1)
     trust = judged * np.sqrt(visible)
 
     def evidence(misses: float, strays: float) -> Array:
@@ -135,14 +113,18 @@ def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
         return without + rectangle_gain(evidence(misses, strays).reshape(box.rows, box.columns))
 
     rates = max(((m, s) for m in _MISSES for s in _STRAYS), key=lambda rate: support(*rate))
-    if os.environ.get("VERB"):
-        print(rates, end=" ")
     return evidence(*rates)
 
 
-def _share(hits: NDArray[np.bool_], prior: float, *, low: float, high: float) -> float:
-    """The share of hits, drawn towards a prior worth ten cells."""
-    return float(np.clip((hits.sum() + 10 * prior) / (len(hits) + 10), low, high))
+def _score(alike: Alike, kind: Kind, judged: Mask) -> Floats:
+    """Agreement [N] of the cells with a kind of cell, scaled: 0 other things, 1 a typical one of the kind."""
+    slack = max(1, round(_SLACK * alike.sheet.side))
+    near = np.array([(x, y) for x in (-slack, 0, slack) for y in (-slack, 0, slack)])
+    fit = agreement(alike.cells, alike.cells_known, shifted(kind.template, near)).max(axis=1)
+    inside_level = float(np.average(fit, weights=kind.weights + 1e-9))
+    others = judged & (alike.weights < 0.1) & (kind.weights < 0.1)
+    outside_level = float(np.clip(np.median(fit[others]), 0, 0.3)) if others.sum() > 8 else 0.15
+    return (fit - outside_level) / max(inside_level - outside_level, 0.05)
 
 
 def _extent(alike: Alike, evidence: Array, outline: Outline, shape: tuple[int, int]) -> Extent:

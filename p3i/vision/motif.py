@@ -68,7 +68,7 @@ def contrast(appearance: Floats) -> Array:
 
 
 def parts(appearance: Floats) -> Array:
-    """Votes, 0 to 1, for the middles of parts: what is brighter or darker than a threshold and ends in the cell.
+    """Votes, 0 to 1, for the middles of parts: what is brighter or darker than a threshold and ends there.
 
     What wraps round the torus is ground (a wall, a sheet of paper); what does not is a thing. Each part
     votes by the contrast along its outline, at every threshold at which it exists.
