@@ -81,7 +81,7 @@ def working_size(pixels: Floats, valid: Mask, image_from_plane: Array) -> tuple[
     mask = cv2.resize(valid.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.99
     sx, sy = size[0] / valid.shape[1], size[1] / valid.shape[0]
     small_from_photo = np.array([[sx, 0, (sx - 1) / 2], [0, sy, (sy - 1) / 2], [0, 0, 1.0]])
-    return small, mask, small_from_photo @ image_from_plane
+    return np.asarray(small, np.float32), mask, small_from_photo @ image_from_plane
 
 
 def look_alike(
@@ -173,7 +173,7 @@ def _second_kind(
     Only cells with parts of the pattern on both sides of them, along a row or a column, may found it, so
     that the border of a board is not taken for a kind.
     """
-    inside = _between(weights.reshape(grid) > 0.5).ravel()
+    inside = between(weights.reshape(grid) > 0.5).ravel()
     gaps = np.flatnonzero(inside & (score < 0.4) & (known.mean(axis=(1, 2)) > 0.9))
     least = max(_LEAST_SECOND, _SECOND_SHARE * float(weights.sum()))
     if len(gaps) < least:
@@ -199,7 +199,7 @@ def _second_kind(
     return Kind(own, all_weights, level)
 
 
-def _between(passes: Mask) -> Mask:
+def between(passes: Mask) -> Mask:
     """Cells [R, C] with passes on both sides of them along their row or their column."""
     result = np.zeros_like(passes)
     for axis in (0, 1):

@@ -4,8 +4,9 @@ That a pattern repeats says nothing about where its objects are: every shift rep
 is looked at in the common cell of the pattern (p3i.vision.motif): half-turn symmetry, a middle that
 differs from a plain border, parts that end within the cell, texture and change from cell to cell gathered
 at one place. At the pattern's rim there is one more witness: true objects are whole there, whereas cells
-of a wrong phase hold halves. The weights with which these speak are a conditional logit, fitted once to
-photographs of many kinds, so the confidence is a probability.
+of a wrong phase hold halves. The weights with which these speak come from a conditional logit over
+photographs of many kinds; where thin lines cross on a plain ground, they take the crossing, not the hole
+between the lines, for the object (a Go board and a fence, but alas also the ruled cells of a sudoku).
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.search.alike import Alike, look_alike, working_size
+from p3i.search.alike import Alike, between, look_alike, working_size
 from p3i.vision.cells import cut, lab, median_cell
 from p3i.vision.motif import concentration, contrast, offsets, parts, symmetry
 
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_WEIGHTS = {"symmetry": 4.2, "contrast": 1.5, "parts": 3.5, "texture": 6.0, "change": 3.7, "whole": 3.8}
+_WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
 _STEP = 2  # samples between the phases that the rim is asked about
 _NEAR = 0.13  # of a period: phases closer than this are the same answer
 
@@ -77,15 +78,14 @@ def phase_cues(alike: Alike) -> dict[str, Array]:
     colours, seen = cut(lab(alike.sheet.values), side), cut(alike.sheet.seen, side)
     typical = alike.weights > 0.3 if (alike.weights > 0.3).any() else alike.weights > 0
     median, _ = median_cell(colours, seen, np.flatnonzero(typical))
-    grid = np.pad(typical.reshape(box.rows, box.columns).astype(np.uint8), 6)
-    filled = cv2.morphologyEx(grid, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
-    region = np.flatnonzero((filled[6:-6, 6:-6].ravel() > 0) & (alike.visible > 0.9))
+    inside = typical | between(typical.reshape(box.rows, box.columns)).ravel()
+    region = np.flatnonzero(inside & (alike.visible > 0.9))
     if len(region) < 3:
         region = np.flatnonzero(typical)
     appearance = _appearance(alike, median)
     return {
         "symmetry": symmetry(alike.template),
-        "contrast": contrast(appearance),
+        "contrast": contrast(median if alike.colour_share > 0.1 else appearance),
         "parts": parts(appearance),
         "texture": concentration((alike.template**2).sum(axis=0)),
         "change": concentration(_change(colours[region], seen[region], median)),
@@ -132,14 +132,9 @@ def _whole(alike: Alike) -> Array:
 
     def quarter(values: NDArray) -> Floats:
         """Sums over the quarter of a cell that starts at each sample."""
-        return cv2.boxFilter(
-            values.astype(np.float32),
-            -1,
-            size,
-            anchor=(0, 0),
-            normalize=False,
-            borderType=cv2.BORDER_CONSTANT,
-        )
+        taken = values.astype(np.float32)
+        sums = cv2.boxFilter(taken, -1, size, anchor=(0, 0), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        return np.asarray(sums, np.float32)
 
     expected = quarter((tiled**2).sum(axis=0) * alike.known)
     energy = quarter((alike.features**2).sum(axis=0))

@@ -22,9 +22,8 @@ _FLAT = 0.4  # a cell with less energy than this share of the template's counts 
 
 def lab(rgb: Floats) -> Floats:
     """RGB [3, H, W] in 0..1 to Lab [3, H, W], scaled so that L runs over 0..1 and a, b alike."""
-    return (
-        cv2.cvtColor(np.ascontiguousarray(rgb.transpose(1, 2, 0)), cv2.COLOR_RGB2LAB).transpose(2, 0, 1) / 100
-    )
+    colours = cv2.cvtColor(np.ascontiguousarray(rgb.transpose(1, 2, 0)), cv2.COLOR_RGB2LAB)
+    return np.asarray(colours.transpose(2, 0, 1) / 100, np.float32)
 
 
 def masked_mean(values: Floats, seen: Mask, size: int) -> Floats:

@@ -128,14 +128,14 @@ def sheet_points(box: Box, side: int) -> Array:
     return np.stack(np.meshgrid(a, b), axis=-1)
 
 
-def _take(image: Floats, x: Floats, y: Floats) -> Floats:
+def _take(image: NDArray, x: Floats, y: Floats) -> Floats:
     """Bilinear samples [N, ...] of an image [H, W, ...] at N places."""
     count, row = len(x), 4096  # OpenCV refuses pictures of more than 32767 samples a side
     padded = np.zeros((2, -(-count // row) * row), np.float32)
     padded[0, :count], padded[1, :count] = x, y
     at = padded.reshape(2, -1, row)
     taken = cv2.remap(image, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return taken.reshape(-1, *image.shape[2:])[:count]
+    return np.asarray(taken.reshape(-1, *image.shape[2:])[:count], np.float32)
 
 
 def straighten(pixels: Floats, valid: Mask, image_from_cells: Array, *, box: Box, side: int) -> Sheet:
