@@ -37,8 +37,6 @@ _ROUNDS = 9
 _SAMPLES = 6
 # More cells than this are not needed for one step of the refinement.
 _MOST_REFINED = 160
-# An instance counts where its peak beats the rim of the search by this much.
-_LEAST_LEAD = 0.05
 # The tilts under which a proposal without one is tried.
 _TILTS_DEG = (0.0, 35.0, 55.0)
 _FEWEST = 4
@@ -108,7 +106,7 @@ def follow(
     best: Fit | None = None
     previous: set[tuple[float, ...]] = set()
     for turn in range(rounds):
-        if not _sane(pattern, theta):
+        if not sane(pattern, theta):
             break
         level = evidence.level_for(side_of_cell(evidence, pattern, theta), finest=finest)
         fit = measure(level, pattern, theta, start=selected)
@@ -125,10 +123,9 @@ def follow(
         found = find_instances(
             level, pattern, theta, selected[few], torch.where(weights > SUPPORT, weights, 0.0)[few]
         )
-        certain = found.peak.clamp(min=0) * (found.lead > _LEAST_LEAD)
-        if int((certain > 0).sum()) < _FEWEST:
+        if int((found.certainty > 0).sum()) < _FEWEST:
             break
-        theta = fit_instances(level, pattern, theta, found, weights=certain.double())
+        theta = fit_instances(level, pattern, theta, found, weights=found.certainty.double())
     return best
 
 
@@ -270,7 +267,7 @@ def side_of_cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:
     return cell_px(evidence.level(320, blur=0.5), pattern, theta)
 
 
-def _sane(pattern: Pattern, theta: Tensor) -> bool:
+def sane(pattern: Pattern, theta: Tensor) -> bool:
     """Whether theta still means a lattice seen by a camera."""
     if not bool(torch.isfinite(theta).all()):
         return False

@@ -7,7 +7,7 @@ from p3i.interp.pattern import Pattern
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit, follow, grow
 from p3i.search.lattice import Lattice, lattice_pattern, map_from_index
-from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit, strict_layout
+from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.primitive import primitive
 from p3i.search.propose.lattice import Proposal, straightened_proposals, window_proposals
 from p3i.search.result import StopReason
@@ -110,7 +110,7 @@ def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
     layout = found_layout(evidence, Lattice.of(pattern, theta), ground)
     if layout is None:
         return None
-    return _answer(session, pattern, layout)
+    return _answer(session, pattern, refitted(evidence, pattern, layout))
 
 
 def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None:

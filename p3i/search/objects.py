@@ -13,15 +13,21 @@ from p3i.interp.pattern import Pattern
 from p3i.search.cells import contrast, sample_grid
 from p3i.search.evidence import Evidence
 from p3i.search.extent import find_extent
-from p3i.search.grow import SUPPORT, Fit, side_of_cell
+from p3i.search.grow import SUPPORT, Fit, sane, side_of_cell
 from p3i.search.lattice import Lattice, cell_areas, cells_in_view, map_from_index
 from p3i.search.phase import find_phase
+from p3i.search.register import find_instances, fit_instances
 
 # Numbers in a program: angles to a thousandth of a degree, lengths to a ten-thousandth of a unit, which is
 # a hundredth of a pixel at the far end of a long row in a large photo.
 _ANGLE_DIGITS = 3
 _LENGTH_DIGITS = 4
 _SAMPLES = 6
+# The last fit: on a map sharper by this, on at most so many objects and at least so few, so many times.
+_SHARPER = 0.6
+_MOST_REFITTED = 300
+_FEWEST_REFITTED = 6
+_REFITS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,6 +137,31 @@ def layout_fit(evidence: Evidence, pattern: Pattern, layout: Layout) -> Fit | No
     share = (area / (level.size.width * level.size.height)).float()
     score = float((share * (found.contrast - SUPPORT).clamp(min=0)).sum())
     return Fit(theta, index, found.contrast, share, score)
+
+
+def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
+    """The layout with camera and lattice fitted once more, to its own objects only and on the fine map.
+
+    What the fit grew on had cells cut anywhere and some beyond the pattern; now each cell holds an object.
+    """
+    theta = layout.lattice.theta(pattern)
+    side = side_of_middle(evidence, pattern, layout)
+    level = evidence.level_for(_SHARPER * side, finest=True)
+    index = cells_in_view(level, pattern, theta, most=4000)
+    index = index[torch.from_numpy(layout.holds(index.numpy()))]
+    if len(index) < _FEWEST_REFITTED:
+        return layout
+    index = index[:: len(index) // _MOST_REFITTED + 1]
+    weights = torch.ones(len(index))
+    for _ in range(_REFITS):
+        found = find_instances(level, pattern, theta, index, weights)
+        weights = found.certainty
+        if int((weights > 0).sum()) < _FEWEST_REFITTED:
+            return layout
+        theta = fit_instances(level, pattern, theta, found, weights=weights.double())
+    if not sane(pattern, theta):
+        return layout
+    return Layout(Lattice.of(pattern, theta), layout.i_range, layout.j_range, layout.guards)
 
 
 def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> float:

@@ -12,7 +12,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.cells import mean_cell, read_cells, sample_points
+from p3i.search.cells import read_cells, sample_points
 from p3i.search.evidence import Level
 from p3i.search.refine import free_numbers
 
@@ -24,6 +24,8 @@ _SHARE_NOISE = 0.02
 _PIXEL_NOISE = 0.25
 # Offsets beyond this many of those count less and less (a Cauchy weight).
 _ROBUST_SCALE = 2.0
+# An instance counts where its peak beats the rim of the search by this much.
+_LEAST_LEAD = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +40,11 @@ class Instances:
     offsets: Tensor
     peak: Tensor
     lead: Tensor
+
+    @property
+    def certainty(self) -> Tensor:
+        """How much each instance counts in a fit, [N]: its agreement, where that has a clear place."""
+        return self.peak.clamp(min=0) * (self.lead > _LEAST_LEAD)
 
 
 def find_instances(
