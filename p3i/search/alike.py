@@ -23,6 +23,7 @@ _LONGER_SIDE = 640  # the photo is worked on at this size
 _SAMPLES = 250_000  # of a sheet, at most about this many
 _ROUNDS = 6
 _LEAST_SECOND, _SECOND_SHARE = 5, 0.08  # cells of a second kind: at least so many, and of the first's number
+_PLAIN = 0.004  # standard deviation of the colours, of 1: below it there is nothing to see
 _LEAST_LEVEL = 0.45  # agreement of a second kind's cells with their mean
 
 
@@ -92,7 +93,7 @@ def look_alike(
     origin: Array,
     support: NDArray | None = None,
 ) -> Alike | None:
-    """The common cell of a lattice in a photo of working size; None where no cell shows.
+    """The common cell of a lattice in a photo of working size; None where no cell shows, or nothing in them.
 
     `support` [H, W] of the same photo, boolean or in 0..1, says where the pattern is thought to be.
     """
@@ -103,7 +104,7 @@ def look_alike(
     side = int(np.clip(np.sqrt(_SAMPLES / box.count) // 2 * 2, 10, 24))
     sheet = straighten(pixels, valid, image_from_cells, box=box, side=side)
     features, known = sheet_features(sheet)
-    if not known.any():
+    if not known.any() or float(sheet.values[:, known].std(axis=1).max()) < _PLAIN:
         return None
     by_gradient, gradient_level = _self_agreement(features[GRADIENT], known, side)
     by_colour, colour_level = _self_agreement(features[COLOUR], known, side)

@@ -25,6 +25,7 @@ Mask = NDArray[np.bool_]
 
 _WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
 _STEP = 2  # samples between the phases that the rim is asked about
+_LEAST_CHANCE = 0.003  # probability of an alternative worth telling
 _NEAR = 0.13  # of a period: phases closer than this are the same answer
 
 
@@ -174,12 +175,13 @@ def _phase(alike: Alike, basis: Array, origin: Array, worth: Array) -> Phase:
             np.abs(np.roll(x, (row, column), (0, 1))), np.abs(np.roll(y, (row, column), (0, 1)))
         ) <= _NEAR  # fmt: skip
         mass = float(left[close].sum())
-        if found and mass < 0.02:
+        if found and mass < _LEAST_CHANCE:
             break
         step = np.array([_peak(worth[row], column), _peak(worth[:, column], row)])
         cell = (np.array([column, row]) + step + 0.5) / n - 0.5
         found.append((origin + (middle + cell) @ basis, mass))
         left[close] = 0
+    found.sort(key=lambda phase: -phase[1])
     return Phase(found[0][0], found[0][1], tuple(found[1:]))
 
 

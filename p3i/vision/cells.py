@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.vision.lab import lab_of
 from p3i.vision.sheet import Sheet
 
 Floats = NDArray[np.float32]
@@ -22,8 +23,9 @@ _FLAT = 0.4  # a cell with less energy than this share of the template's counts 
 
 def lab(rgb: Floats) -> Floats:
     """RGB [3, H, W] in 0..1 to Lab [3, H, W], scaled so that L runs over 0..1 and a, b alike."""
-    colours = cv2.cvtColor(np.ascontiguousarray(rgb.transpose(1, 2, 0)), cv2.COLOR_RGB2LAB)
-    return np.asarray(colours.transpose(2, 0, 1) / 100, np.float32)
+    return np.asarray(
+        lab_of(np.ascontiguousarray(rgb.transpose(1, 2, 0))).transpose(2, 0, 1) / 100, np.float32
+    )
 
 
 def masked_mean(values: Floats, seen: Mask, size: int) -> Floats:

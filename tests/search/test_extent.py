@@ -1,0 +1,112 @@
+"""Which cells of a known lattice hold an object, on drawn photos where that is known."""
+
+import numpy as np
+import pytest
+
+from p3i.search.extent import find_extent
+
+RECTANGLE = [(i, j) for i in range(6) for j in range(8)]
+TRIANGLE = [(i, j) for i in range(6) for j in range(6) if i + j >= 5]
+TIN = [(i, j) for i in range(4) for j in range(3)]
+
+
+def extent_of(scene, **changes):
+    given = {
+        "pixels": scene.pixels,
+        "valid": scene.valid,
+        "image_from_plane": scene.image_from_plane,
+        "basis": scene.basis,
+        "origin": scene.origin,
+        **changes,
+    }
+    return find_extent(**given)
+
+
+def shifted(cells, i, j):
+    return {(a + i, b + j) for a, b in cells}
+
+
+@pytest.mark.parametrize("kind", ["disc", "light_disc", "square", "letter"])
+def test_a_board_of_objects_in_clutter_is_found_whole(draw_scene, kind):
+    extent = extent_of(draw_scene(RECTANGLE, kind=kind))
+    assert extent.cells == set(RECTANGLE)
+    assert (extent.i_range, extent.j_range, extent.guards) == ((0, 6), (0, 8), ())
+
+
+def test_a_triangle_is_one_guard(draw_scene):
+    extent = extent_of(draw_scene(TRIANGLE, basis=((140.0, 0.0), (20.0, 140.0)), radius=40))
+    assert extent.cells == set(TRIANGLE)
+    assert extent.guards == ((1, 1, 5),)
+
+
+def test_a_tin_of_twelve_is_found_whole(draw_scene):
+    scene = draw_scene(TIN, basis=((230.0, 0.0), (0.0, 240.0)), origin=(250.0, 330.0), radius=85)
+    assert extent_of(scene).cells == set(TIN)
+
+
+def test_another_origin_of_the_same_lattice_only_renumbers(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    moved = extent_of(scene, origin=scene.origin + 3 * scene.basis[0] - 2 * scene.basis[1])
+    assert moved.cells == shifted(RECTANGLE, -3, 2)
+    assert (moved.i_range, moved.j_range) == ((-3, 3), (2, 10))
+
+
+def test_objects_hidden_by_something_else_stay_inside(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    pixels = scene.pixels.copy()
+    pixels[200:290, 250:330] = (0.1, 0.5, 0.2)
+    extent = extent_of(scene, pixels=pixels)
+    assert extent.cells == set(RECTANGLE)
+    assert min(extent.presence[cell] for cell in RECTANGLE) < 0.5
+
+
+def test_what_a_mask_hides_is_no_evidence(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    pixels, valid = scene.pixels.copy(), scene.valid.copy()
+    valid[180:320, 220:400] = False
+    pixels[~valid] = np.random.default_rng(1).uniform(size=(int((~valid).sum()), 3))
+    assert extent_of(scene, pixels=pixels, valid=valid).cells == set(RECTANGLE)
+
+
+def test_a_pattern_that_leaves_the_photo_is_drawn_up_to_its_border(draw_scene):
+    cells = [(i, j) for i in range(-2, 11) for j in range(-2, 11)]
+    corners = ((-300, -200), (900, -260), (1000, 760), (-380, 700))
+    scene = draw_scene(cells, corners=corners)
+    extent = extent_of(scene)
+    at = np.array([scene.origin + np.array(c) @ scene.basis for c in cells])
+    mapped = np.c_[at, np.ones(len(at))] @ scene.image_from_plane.T
+    x, y = (mapped[:, :2] / mapped[:, 2:]).T
+    shown = (x >= 0) & (x <= 639) & (y >= 0) & (y <= 479)
+    assert extent.cells == {cell for cell, inside in zip(cells, shown, strict=True) if inside}
+
+
+def test_a_slightly_wrong_basis_still_finds_the_objects(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    assert extent_of(scene, basis=scene.basis * 1.005).cells == set(RECTANGLE)
+
+
+def test_large_photos_give_the_same_cells(draw_scene):
+    corners = tuple((2 * x, 2 * y) for x, y in ((90, 60), (560, 20), (620, 470), (20, 430)))
+    assert extent_of(draw_scene(RECTANGLE, size=(1280, 960), corners=corners)).cells == set(RECTANGLE)
+
+
+def test_a_support_may_be_smaller_than_the_pattern(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    support = np.zeros(scene.valid.shape, np.float32)
+    support[150:330, 180:420] = 1
+    assert extent_of(scene, support=support).cells == set(RECTANGLE)
+
+
+def test_the_answer_is_the_same_every_time(draw_scene):
+    scene = draw_scene(TRIANGLE)
+    assert extent_of(scene) == extent_of(scene)
+
+
+def test_a_plain_photo_holds_nothing(draw_scene):
+    scene = draw_scene([])
+    assert extent_of(scene, pixels=np.full_like(scene.pixels, 0.5)) is None
+
+
+def test_a_photo_without_a_known_pixel_holds_nothing(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    assert extent_of(scene, valid=np.zeros_like(scene.valid)) is None
