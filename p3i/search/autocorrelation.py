@@ -107,7 +107,7 @@ def valley_contrast(found: Autocorrelation, shifts: np.ndarray) -> np.ndarray:
 
 
 def _peaks(found: Autocorrelation, *, least: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-    """The local maxima of one half plane (the other mirrors it): shifts [N, 2] and their worth, best first."""
+    """The local maxima of one half plane, as the other mirrors it: shifts [N, 2] and worth, best first."""
     values = found.values
     middle = values.shape[0] // 2
     high = cv2.dilate(values, np.ones((5, 5), np.uint8))

@@ -10,7 +10,8 @@ from p3i.search.lattice import Lattice, lattice_pattern, map_from_index
 from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.primitive import primitive
 from p3i.search.propose.lattice import Proposal, straightened_proposals, window_proposals
-from p3i.search.result import StopReason
+from p3i.search.result import NEEDED, StopReason
+from p3i.search.score import score_of
 from p3i.search.session import Answer, Session
 
 # So many proposals of each kind are looked at, and so many fits that differ are grown in all.
@@ -25,6 +26,8 @@ _RIVAL = 0.5
 # A pattern of n cells counts as if it had _FEW_CELLS fewer: the numbers and the mean cell take their part.
 _FEW_CELLS = 10
 _LAST_ROUNDS = 4
+# So many fits are worked out to programs before the search gives up.
+_MOST_FINISHED = 3
 
 
 def find_lattices(session: Session) -> list[Answer]:
@@ -36,17 +39,17 @@ def find_lattices(session: Session) -> list[Answer]:
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
     fits.sort(key=lambda fit: -worth(fit))
-    wanted = max(2, session.config.top)
     answers: list[Answer] = []
     finished: list[Fit] = []
     for fit in fits:
-        if len(finished) >= wanted or (finished and worth(fit) < _RIVAL * worth(fits[0])):
+        sure = max((answer.score for answer in answers), default=0.0) >= NEEDED
+        if sure and len(answers) >= session.config.top and worth(fit) < _RIVAL * worth(finished[0]):
+            break
+        if len(finished) >= max(_MOST_FINISHED, session.config.top) or (finished and not session.go_on()):
             break
         if any(_same(session.evidence, pattern, fit, other) for other in finished):
             continue
-        if finished and not session.go_on():
-            break
-        session.tell("reading off the objects", 0.8 + 0.1 * len(finished))
+        session.tell("reading off the objects", 0.8 + 0.05 * len(finished))
         finished.append(fit)
         answer = _finished(session, pattern, fit)
         if answer is not None:
@@ -119,7 +122,7 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     if measured is None:
         return None
     count = len(measured.index)
-    score = float(measured.contrast.clamp(min=0).mean()) * max(0.0, 1 - 4 / count)
+    score = score_of(float(measured.contrast.clamp(min=0).mean()), count)
     if session.config.extent == "image":
         layout = filling_layout(session.evidence, pattern, layout)
     notes: tuple[str, ...] = ()

@@ -11,7 +11,7 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import contrast, sample_grid
-from p3i.search.evidence import Evidence
+from p3i.search.evidence import Evidence, Level
 from p3i.search.extent import find_extent
 from p3i.search.grow import SUPPORT, Fit, sane, side_of_cell
 from p3i.search.lattice import Lattice, cell_areas, cells_in_view, map_from_index
@@ -119,19 +119,25 @@ def strict_layout(layout: Layout) -> tuple[Layout, float]:
 
 
 def layout_fit(evidence: Evidence, pattern: Pattern, layout: Layout) -> Fit | None:
-    """How well the cells that a layout draws predict each other; None for fewer than four in view."""
+    """How well the cells that a layout draws predict each other; None for fewer than four in view.
+
+    In the search's features, or in these with the colours, whichever shows more: a chequered floor's cell is
+    told from half of it by colour only, and the stones on a board differ in colour only.
+    """
     theta = layout.lattice.theta(pattern)
-    name = evidence.config.features
-    if "rgb" not in name.split("+"):
-        # A chequered floor's cell is told from half of it by colour only.
-        name += "+rgb"
-    level = evidence.level_for(side_of_middle(evidence, pattern, layout), name=name)
+    side = side_of_middle(evidence, pattern, layout)
+    features = evidence.config.features
+    names = [features] if "rgb" in features.split("+") else [features, features + "+rgb"]
+    fits = [_measured(evidence.level_for(side, name=name), pattern, layout, theta) for name in names]
+    return max((fit for fit in fits if fit is not None), key=lambda fit: fit.score, default=None)
+
+
+def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> Fit | None:
     index = cells_in_view(level, pattern, theta, most=4000)
     index = index[torch.from_numpy(layout.holds(index.numpy()))]
     if len(index) < 4:
         return None
-    if len(index) > 600:
-        index = index[:: len(index) // 600 + 1]
+    index = index[:: len(index) // 600 + 1]
     found = contrast(level, pattern, theta, index, weights=torch.ones(len(index)), grid=sample_grid(_SAMPLES))
     area, _ = cell_areas(map_from_index(level, pattern, theta), index, level)
     share = (area / (level.size.width * level.size.height)).float()

@@ -14,7 +14,15 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.cells import agreement, agreement_with_others, contrast, mean_cell, read_cells, sample_grid
+from p3i.search.cells import (
+    Cells,
+    agreement,
+    agreement_with_others,
+    contrast,
+    mean_cell,
+    read_cells,
+    sample_grid,
+)
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit, side_of_cell
 from p3i.search.lattice import Lattice, reduce_basis
@@ -33,6 +41,8 @@ _FINER = (
 _SAME = 0.85
 # ... and different where they agree less than this.
 _DIFFERENT = 0.45
+# Cells that agree with the mean of all others this well are of one kind, whatever their cosets.
+_ALIKE = 0.3
 # Cells that agree with their own kind by less than this say nothing.
 _LEAST_AGREEMENT = 0.2
 # A finer lattice must keep this share of the contrast against half steps (DESIGN.md, 4.5).
@@ -88,7 +98,7 @@ def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground |
         factors = np.array(rows)
         at = ground.index.numpy() @ np.linalg.inv(factors)
         coset = (np.abs(at - np.round(at)) > 1e-6).any(1).astype(int)
-        likeness = _likeness(evidence, pattern, ground, coset)
+        likeness = _likeness(evidence, pattern, ground, coset, unless_alike=True)
         if likeness < _DIFFERENT and (best is None or likeness < best[0]):
             best = likeness, factors
     if best is None:
@@ -123,10 +133,13 @@ def _reduced(basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return reduced, np.round(basis @ np.linalg.inv(reduced))
 
 
-def _likeness(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray) -> float:
+def _likeness(
+    evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray, *, unless_alike: bool = False
+) -> float:
     """How well cells agree with the means of the other cosets, relative to their own: 1 where cosets are one.
 
-    The lesser of features and colours; those that do not repeat within a coset have no say.
+    The lesser of features and colours; those that do not repeat within a coset have no say, and with
+    `unless_alike` those in which all cells are alike have none either.
     """
     kinds = np.unique(coset)
     if min(int((coset == kind).sum()) for kind in kinds) < 3:
@@ -148,6 +161,8 @@ def _likeness(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.n
         )
         if own < _LEAST_AGREEMENT:
             continue
+        if unless_alike and _agreement_of_all(groups) > _ALIKE:
+            continue
         means = [mean_cell(group, weights)[0] for group, weights in zip(groups, ones, strict=True)]
         across = [
             float(agreement(group.values, mean[None], group.known).median())
@@ -157,6 +172,12 @@ def _likeness(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.n
         ]
         least = min(least, min(across) / own)
     return least
+
+
+def _agreement_of_all(groups: list[Cells]) -> float:
+    """The median agreement of the cells of all groups with the mean of all the others."""
+    together = Cells(torch.cat([one.values for one in groups]), torch.cat([one.known for one in groups]))
+    return float(agreement_with_others(together, torch.ones(len(together.values))).median())
 
 
 def _contrast(evidence: Evidence, pattern: Pattern, ground: _Ground) -> float:

@@ -9,6 +9,9 @@ from typing import Literal
 
 from p3i.grammar.ast import Program
 
+NEEDED = 0.15
+"""The score that an answer must reach (docs/benchmarks.md says what it was calibrated on)."""
+
 StructureFound = Literal["lattice", "circular", "hybrid"]
 FocalSource = Literal["option", "header", "exif", "default"]
 

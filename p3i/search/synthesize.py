@@ -8,14 +8,11 @@ from p3i.interp import unroll
 from p3i.interp.camera import Camera, project
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence
-from p3i.search.result import Candidate, FocalSource, StopReason, SynthesisResult
+from p3i.search.result import NEEDED, Candidate, FocalSource, StopReason, SynthesisResult
 from p3i.search.session import Answer, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
-
-NEEDED = 0.25
-"""The score that an answer must reach (docs/benchmarks.md says what it was calibrated on)."""
 
 # Pictures below this many pixels a side, or with less than this share known, are not searched.
 _LEAST_SIDE = 32

@@ -1,0 +1,142 @@
+"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score."""
+
+from dataclasses import dataclass
+
+import torch
+
+from p3i.errors import ProgramError
+from p3i.grammar.ast import Program
+from p3i.interp.camera import project
+from p3i.interp.compile import compile
+from p3i.interp.pattern import Pattern
+from p3i.interp.unroll import distinct, edges
+from p3i.search.cells import HALF_STEPS, contrast, sample_grid
+from p3i.search.config import SearchConfig
+from p3i.search.evidence import Evidence, Level
+from p3i.vision.image import Image
+from p3i.vision.threads import limit_threads
+from p3i.vision.warp import sample, sample_valid
+
+_SAMPLES = 6
+_MOST_CELLS = 600
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """A program on a photo.
+
+    `equation2`: the paper's loss, the sum over `edges` neighbouring pairs of draws, both in sight, of the squared
+    difference of their features. `normalised`: the mean over the objects in sight of how much better the others
+    predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
+    perfect. It is what `synth` prints as score. `objects`: how many are in sight.
+    """
+
+    equation2: float
+    edges: int
+    normalised: float
+    objects: int
+
+
+def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation:
+    """Score a program on a photo, whatever it draws.
+
+    The focal is that of the options, else the program's header, else the photo, else 35 mm. Raises
+    ProgramError where fewer than two of the program's objects lie in the photo.
+    """
+    limit_threads(config.threads)
+    header = program.header.focal_mm if program.header is not None else None
+    focal_mm = next(mm for mm in (config.focal_mm, header, image.focal_mm, 35.0) if mm is not None)
+    evidence = Evidence(image, config, focal_mm)
+    pattern = _without_doubles(compile(program))
+    points, in_front = pattern.centers_px(size=image.size, focal_mm=focal_mm)
+    limits = torch.tensor([image.size.width - 0.5, image.size.height - 0.5])
+    seen = in_front & (points >= -0.5).all(1) & (points <= limits).all(1)
+    if int(seen.sum()) < 2:
+        raise ProgramError(f"{int(seen.sum())} of the program's objects lie in the photo; a score needs two")
+    loss, pairs = _equation2(evidence, pattern, points, seen)
+    return Evaluation(loss, pairs, normalised_score(evidence, pattern, seen), int(seen.sum()))
+
+
+def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -> float:
+    """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`."""
+    index = pattern.index[seen].double()
+    index = index[:: len(index) // _MOST_CELLS + 1]
+    features = evidence.config.features
+    names = [features] if "rgb" in features.split("+") else [features, features + "+rgb"]
+    side = _cell_px(evidence, pattern, index)
+    means = []
+    for name in names:
+        found = contrast(
+            evidence.level_for(side, name=name),
+            pattern,
+            pattern.theta,
+            index,
+            weights=torch.ones(len(index)),
+            grid=sample_grid(_SAMPLES),
+            half_steps=_half_steps(pattern),
+        )
+        means.append(float(found.contrast.clamp(min=0).mean()))
+    return score_of(max(means), len(index))
+
+
+def score_of(mean_contrast: float, count: int) -> float:
+    """The normalised score of `count` cells: eight numbers are fitted, which is what four cells give."""
+    return mean_contrast * max(0.0, 1 - 4 / max(count, 1))
+
+
+def _equation2(
+    evidence: Evidence, pattern: Pattern, points: torch.Tensor, seen: torch.Tensor
+) -> tuple[float, int]:
+    """The loss as printed, on the features at the photo's own size up to the fine map, and its pairs."""
+    features = evidence.features(max(1, evidence.image.size.longer))
+    matrix = features.map_from_photo
+    at, _ = project(matrix, points)
+    known = seen & sample_valid(features.valid, at.float())
+    pairs = pattern.edges[known[pattern.edges].all(1)]
+    values = sample(features.values, at.float())
+    difference = values[pairs[:, 0]] - values[pairs[:, 1]]
+    return float(difference.square().sum()), len(pairs)
+
+
+def _without_doubles(pattern: Pattern) -> Pattern:
+    """The pattern with draws that coincide kept once (DESIGN.md, 2.2)."""
+    centers = pattern.centers().tolist()
+    kept = distinct([(x, y, 0, 0) for x, y in centers])
+    if len(kept) == len(centers):
+        return pattern
+    live = [tuple(pair) for pair in pattern.index[kept].tolist()]
+    return Pattern(
+        pattern.program,
+        pattern.paths,
+        pattern.theta,
+        pattern.index[kept],
+        torch.tensor(edges(live), dtype=torch.int64).reshape(-1, 2),
+    )
+
+
+def _half_steps(pattern: Pattern) -> torch.Tensor:
+    """The half steps of the indices that move the draws: a single loop has one."""
+    moving = [
+        any(
+            path.startswith("draw.") and path.endswith(f".{variable}") and value != 0
+            for path, value in zip(pattern.paths, pattern.theta.tolist(), strict=True)
+        )
+        for variable in ("i", "j")
+    ]
+    if all(moving):
+        return HALF_STEPS
+    return HALF_STEPS[:1] if moving[0] else HALF_STEPS[1:2]
+
+
+def _cell_px(evidence: Evidence, pattern: Pattern, index: torch.Tensor) -> float:
+    """A typical distance of neighbours, in photo pixels: the size of what is compared."""
+    level: Level = evidence.level_for(100.0)
+    matrix = level.map_from_plane(pattern, pattern.theta)
+    here, front = project(matrix, pattern.points_at(index))
+    steps = []
+    for step in _half_steps(pattern)[:2]:
+        there, ahead = project(matrix, pattern.points_at(index + 2 * step))
+        steps.append((there - here).norm(dim=1)[front & ahead])
+    lengths = torch.cat(steps)
+    typical = float(lengths.median()) if len(lengths) else 20.0
+    return max(typical, 2.0) / float(level.map_from_photo[0, 0])
