@@ -79,7 +79,6 @@ def test_every_example_is_canonical_and_has_no_findings(path: Path) -> None:
 
 
 def test_the_readme_runs_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
-    pytest.importorskip("p3i.search.synthesize")
     blocks = re.findall(r"^```python\n(.*?)^```", TEXT[ROOT / "README.md"], flags=re.MULTILINE | re.DOTALL)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)

@@ -3,7 +3,6 @@
 Each case is a process of its own, as a user starts it.
 """
 
-import importlib.util
 import io
 import os
 import re
@@ -16,10 +15,6 @@ import cv2
 import numpy as np
 import pytest
 from PIL import Image
-
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("p3i.search.synthesize") is None, reason="the search is not there yet"
-)
 
 HEIGHT, WIDTH = 240, 320
 
