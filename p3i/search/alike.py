@@ -24,6 +24,7 @@ _SAMPLES = 250_000  # of a sheet, at most about this many
 _ROUNDS = 6
 _LEAST_SECOND, _SECOND_SHARE = 5, 0.08  # cells of a second kind: at least so many, and of the first's number
 _PLAIN = 0.004  # standard deviation of the colours, of 1: below it there is nothing to see
+_LEAST_ENERGY = 0.5  # of a second kind's texture, as a share of the first's: an empty place is no kind
 _LEAST_LEVEL = 0.45  # agreement of a second kind's cells with their mean
 
 
@@ -180,24 +181,29 @@ def _second_kind(
     if len(gaps) < least:
         return None
     gaps = gaps[np.linspace(0, len(gaps) - 1, min(len(gaps), 300)).astype(int)]
-    flat = cells[gaps].reshape(len(gaps), -1)
+    # By gradient alone: stones are black and white.
+    some, some_known = cells[gaps][:, GRADIENT], known[gaps]
+    flat = some.reshape(len(gaps), -1)
     size = np.linalg.norm(flat, axis=1)
     near = (flat @ flat.T) / np.maximum(np.outer(size, size), 1e-6)
     seed = np.clip(near - 0.3, 0, None).sum(axis=1).argmax()
     chosen = np.clip(near[seed] - 0.3, 0, None).astype(np.float32)
-    own, level = weighted_mean(cells[gaps], known[gaps], chosen), 0.0
     for _ in range(_ROUNDS):
-        fit = agreement(cells[gaps], known[gaps], own[None])[:, 0].clip(0, None)
+        own = weighted_mean(some, some_known, chosen)
+        fit = agreement(some, some_known, own[None])[:, 0].clip(0, None)
         level = float((chosen * fit).sum() / max(float(chosen.sum()), 1e-6))
         if level < _LEAST_LEVEL:
             return None
         chosen = np.clip((fit / level - 0.4) / 0.6, 0, 1)
-        own = weighted_mean(cells[gaps], known[gaps], chosen)
     if chosen.sum() < least:
         return None
-    all_weights = np.zeros(len(cells), np.float32)
+    template, all_weights = weighted_mean(cells[gaps], some_known, chosen), np.zeros(len(cells), np.float32)
     all_weights[gaps] = chosen
-    return Kind(own, all_weights, level)
+    common = weighted_mean(cells, known, weights)
+    if (template[GRADIENT] ** 2).sum() < _LEAST_ENERGY * (common[GRADIENT] ** 2).sum():
+        return None  # places that are alike because they are all empty
+    level = float(np.average(agreement(cells[gaps], some_known, template[None])[:, 0], weights=chosen))
+    return Kind(template, all_weights, level)
 
 
 def between(passes: Mask) -> Mask:

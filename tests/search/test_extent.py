@@ -60,6 +60,13 @@ def test_objects_hidden_by_something_else_stay_inside(draw_scene):
     assert min(extent.presence[cell] for cell in RECTANGLE) < 0.5
 
 
+def test_a_third_of_the_objects_may_be_missing(draw_scene):
+    rng = np.random.default_rng(3)
+    cells = [(i, j) for i in range(8) for j in range(8)]
+    present = [cell for cell in cells if rng.uniform() > 0.33]
+    assert extent_of(draw_scene(present)).cells == set(cells)
+
+
 def test_what_a_mask_hides_is_no_evidence(draw_scene):
     scene = draw_scene(RECTANGLE)
     pixels, valid = scene.pixels.copy(), scene.valid.copy()

@@ -43,6 +43,20 @@ def test_small_and_large_objects_are_met_in_their_middle(draw_scene, radius):
     assert phase.confidence > 0.5
 
 
+def test_the_middle_is_met_to_a_fraction_of_a_sample(draw_scene):
+    scene = draw_scene(CELLS, radius=30, noise=0.005)
+    assert miss(scene, phase_of(scene).origin) < 0.012
+
+
+def test_the_rim_tells_dark_squares_from_the_light_ones_between_them(draw_scene):
+    # On the lattice of every second square, dark and light ones are equals but for the board's end.
+    cells = [(i, j) for i in range(-3, 7) for j in range(-3, 7) if 0 <= i + j < 8 and -3 <= i - j <= 4]
+    scene = draw_scene(
+        cells, kind="square", basis=((100.0, 100.0), (100.0, -100.0)), origin=(250.0, 600.0), radius=49.5
+    )
+    assert miss(scene, phase_of(scene).origin) < 0.1
+
+
 def test_a_slanted_basis_is_no_obstacle(draw_scene):
     scene = draw_scene(CELLS[:42], basis=((110.0, 10.0), (50.0, 95.0)))
     assert miss(scene, phase_of(scene).origin) < 0.1

@@ -60,6 +60,12 @@ def test_an_empty_cell_does_not_agree():
     assert fit[8] > 0.8
 
 
+def test_a_faint_copy_of_the_cell_agrees_only_faintly():
+    cells, known = features_of(sheet_of(some_tile()))
+    fit = agreement(0.1 * cells[8:9], known[8:9], cells[8:9])[0, 0]
+    assert fit == pytest.approx(0.25, abs=0.01)
+
+
 def test_agreement_with_a_shifted_cell_is_found_at_that_shift():
     cells, known = features_of(sheet_of(some_tile()))
     shifts = np.array([(0, 0), (3, 0), (0, -5)])
