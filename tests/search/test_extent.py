@@ -1,5 +1,6 @@
 """Which cells of a known lattice hold an object, on drawn photos where that is known."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -65,6 +66,20 @@ def test_a_third_of_the_objects_may_be_missing(draw_scene):
     cells = [(i, j) for i in range(8) for j in range(8)]
     present = [cell for cell in cells if rng.uniform() > 0.33]
     assert extent_of(draw_scene(present)).cells == set(cells)
+
+
+def test_stones_count_as_objects_of_a_board_of_lines(draw_scene):
+    cells = [(i, j) for i in range(8) for j in range(8)]
+    stones = [(i, j) for i in range(2, 6) for j in range(1, 6)]
+    scene = draw_scene(cells, kind="crossing")
+    pixels = scene.pixels.copy()
+    for number, (i, j) in enumerate(stones):
+        x, y, z = scene.image_from_plane @ [*(scene.origin + i * scene.basis[0] + j * scene.basis[1]), 1]
+        shade = 0.05 if number % 2 else 0.95
+        cv2.circle(pixels, (round(x / z), round(y / z)), 15, (shade, shade, shade), -1, cv2.LINE_AA)
+    extent = extent_of(scene, pixels=pixels)
+    assert extent.cells == set(cells)
+    assert np.mean([extent.presence[cell] > 0.5 for cell in stones]) > 0.7
 
 
 def test_what_a_mask_hides_is_no_evidence(draw_scene):
