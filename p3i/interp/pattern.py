@@ -11,6 +11,7 @@ units, x right and y down; angles are degrees. theta may carry any leading dimen
 place and nothing branches on a value, so torch.func.vmap and jacfwd go through.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -57,7 +58,7 @@ class Pattern:
             if isinstance(form, Affine):
                 return affine(path)
             turn = torch.cos if form.function == "Cos" else torch.sin
-            angle = torch.deg2rad(affine(f"{path}.angle"))
+            angle = affine(f"{path}.angle") * (math.pi / 180)
             return affine(f"{path}.radius") * turn(angle) + affine(f"{path}.offset")
 
         draw = nest(self.program).draw

@@ -103,20 +103,19 @@ def contrast(
     rounds: int = 2,
 ) -> Contrast:
     """Predict each cell from all others. `weights` [N] start the mean; then the contrast itself weighs."""
-    cells = read_cells(level, pattern, theta, index, grid)
-    shifted = [
-        [read_cells(level, pattern, theta, index + sign * step, grid) for sign in (1, -1)]
-        for step in half_steps
-    ]
+    # All in one reading: what a cell costs is little, what a call costs is not.
+    steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), half_steps, -half_steps])
+    every = read_cells(level, pattern, theta, (index[None] + steps[:, None]).reshape(-1, 2), grid)
+    values = every.values.reshape(len(steps), len(index), *every.values.shape[1:])
+    known = every.known.reshape(len(steps), len(index), -1)
+    cells = Cells(values[0], known[0])
     found = Contrast(torch.zeros(len(index)), torch.zeros(len(index)))
     weights = weights.float()
     for _ in range(rounds):
         mean, _ = mean_cell(cells, weights)
         whole = agreement_with_others(cells, weights)
-        half = torch.stack(
-            [sum(agreement(c.values, mean[None], c.known) for c in pair) / len(pair) for pair in shifted]
-        )
-        found = Contrast(whole, whole - half.amax(0).clamp(min=0))
+        at_half = agreement(values[1:], mean, known[1:]).reshape(2, len(half_steps), -1)
+        found = Contrast(whole, whole - at_half.mean(0).amax(0).clamp(min=0))
         weights = found.contrast.clamp(min=0)
         if float(weights.sum()) <= 0:
             break

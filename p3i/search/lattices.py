@@ -17,10 +17,10 @@ from p3i.search.session import Answer, Session
 # So many proposals of each kind are looked at, and so many fits that differ are grown in all.
 _MOST_PROPOSALS = 10
 _MOST_GROWN = 7
-# Fits of this worth are certain enough that only a better one could matter; after two more tries without
+# Fits of this worth are certain enough that only a better one could matter; after one more try without
 # one the search goes on to finish it.
 _CERTAIN = 0.05
-_TRIES_WHEN_CERTAIN = 2
+_TRIES_WHEN_CERTAIN = 1
 # A runner-up is finished too where its worth is at least this share of the best.
 _RIVAL = 0.5
 # A pattern of n cells counts as if it had _FEW_CELLS fewer: the numbers and the mean cell take their part.

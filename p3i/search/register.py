@@ -112,7 +112,7 @@ def fit_instances(
     *,
     weights: Tensor,
     fixed: frozenset[str] = frozenset(),
-    iterations: int = 8,
+    iterations: int = 6,
 ) -> Tensor:
     """Move theta [P] so that the program's points fall on the instances; robust against strays.
 
@@ -142,7 +142,7 @@ def fit_instances(
             break
         worst = float(step.abs().max())
         theta = theta.index_put((places,), theta[places] + step * limits / max(1.0, worst))
-        if worst < 1e-4:
+        if worst < 1e-3:
             break
     return theta
 

@@ -20,7 +20,7 @@ from p3i.search.lattice import Lattice, reduce_basis
 # The canvas of a straightened view, in pixels a side.
 _CANVAS = 128
 # Poses lie about this far apart when seen straight on, closer with tilt, and up to this tilt.
-_POSE_STEP_DEG = 9.0
+_POSE_STEP_DEG = 11.0
 _MOST_TILT_DEG = 66.0
 # A view reaches to where things are this many times as far away as the nearest.
 _DEPTH_RANGE = 3.5
