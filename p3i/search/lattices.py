@@ -131,7 +131,8 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
         pixels = moved * session.evidence.image.size.unit_px
         notes = (f"Table 1 has no constants: the objects lie {pixels:.1f} pixels from the free fit",)
     session.record("answer", cells=count, score=score, worth=worth(measured))
-    return Answer(layout.program(), "lattice", score, worth(measured), notes)
+    program = layout.program(from_zero=not session.config.strict)
+    return Answer(program, "lattice", score, worth(measured), notes)
 
 
 def _explained(evidence: Evidence, pattern: Pattern, proposal: Proposal, fit: Fit) -> bool:

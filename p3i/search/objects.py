@@ -49,11 +49,16 @@ class Layout:
             inside &= a * i + b * j >= c
         return inside
 
-    def program(self) -> Program:
-        """The program, with both loops starting at 0."""
+    def program(self, *, from_zero: bool = True) -> Program:
+        """The program, with both loops starting at 0, or else at the first index of each range.
+
+        Where the origin is 0, the latter needs no constants in `Draw` and guards, of which Table 1 has none.
+        """
         (i0, i1), (j0, j1) = self.i_range, self.j_range
+        i_start, j_start = (0, 0) if from_zero else (i0, j0)
+        i_skip, j_skip = i0 - i_start, j0 - j_start
         u, v = self.lattice.basis
-        origin = self.lattice.origin + i0 * u + j0 * v
+        origin = self.lattice.origin + i_skip * u + j_skip * v
 
         def length(value: float) -> float:
             return round(float(value), _LENGTH_DIGITS)
@@ -63,12 +68,12 @@ class Layout:
             Affine(length(u[1]), length(v[1]), length(origin[1])),
         )
         for a, b, c in reversed(self.guards):
-            body = If(Affine(a, b, a * i0 + b * j0 - c), body)
-        inner = For("j", Affine(), Affine(constant=j1 - j0), body)
+            body = If(Affine(a, b, a * i_skip + b * j_skip - c), body)
+        inner = For("j", Affine(constant=j_start), Affine(constant=j1 - j_skip), body)
         pose = CameraPose(
             round(self.lattice.rx_deg, _ANGLE_DIGITS), round(self.lattice.ry_deg, _ANGLE_DIGITS)
         )
-        return Program(pose, For("i", Affine(), Affine(constant=i1 - i0), inner))
+        return Program(pose, For("i", Affine(constant=i_start), Affine(constant=i1 - i_skip), inner))
 
 
 def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:

@@ -25,9 +25,9 @@ _MOST_CELLS = 600
 class Evaluation:
     """A program on a photo.
 
-    `equation2`: the paper's loss, the sum over `edges` neighbouring pairs of draws, both in sight, of the squared
-    difference of their features. `normalised`: the mean over the objects in sight of how much better the others
-    predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
+    `equation2`: the paper's loss, the sum over `edges` neighbouring pairs of draws, both in sight, of the
+    squared difference of their features. `normalised`: the mean over the objects in sight of how much better
+    the others predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
     perfect. It is what `synth` prints as score. `objects`: how many are in sight.
     """
 
