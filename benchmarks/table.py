@@ -38,8 +38,10 @@ def measures(rows: Sequence[Row]) -> str:
 
     def mean(key: str, among: Sequence[Row]) -> float:
         values = [row[key] for row in among if row.get(key) is not None]
-        return float(np.mean(values)) if values else float("nan")
+        return float(np.mean(values))
 
+    if not answered:
+        return f"{len(rows)} | 0" + " | -" * (MEASURES.count("|") - 1)
     poses = np.array([row["pose_deg"] for row in reliable])
     return " | ".join(
         (
