@@ -40,20 +40,10 @@ def find_lattices(session: Session) -> list[Answer]:
         session.stopped = StopReason.INTERRUPTED
     fits.sort(key=lambda fit: -worth(fit))
     answers: list[Answer] = []
-    finished: list[Fit] = []
-    for fit in fits:
-        sure = max((answer.score for answer in answers), default=0.0) >= NEEDED
-        if sure and len(answers) >= session.config.top and worth(fit) < _RIVAL * worth(finished[0]):
-            break
-        if len(finished) >= max(_MOST_FINISHED, session.config.top) or (finished and not session.go_on()):
-            break
-        if any(_same(session.evidence, pattern, fit, other) for other in finished):
-            continue
-        session.tell("reading off the objects", 0.8 + 0.05 * len(finished))
-        finished.append(fit)
-        answer = _finished(session, pattern, fit)
-        if answer is not None:
-            answers.append(answer)
+    try:
+        _finish_all(session, pattern, fits, answers)
+    except KeyboardInterrupt:  # what is finished by now is kept
+        session.stopped = StopReason.INTERRUPTED
     return sorted(answers, key=lambda answer: -answer.worth)
 
 
@@ -95,6 +85,24 @@ def _alternating(first: list[Proposal], second: list[Proposal]) -> list[Proposal
     for place in range(max(len(first), len(second))):
         merged += first[place : place + 1] + second[place : place + 1]
     return merged
+
+
+def _finish_all(session: Session, pattern: Pattern, fits: list[Fit], answers: list[Answer]) -> None:
+    """Work out fits, the best first, to programs until one is sure; the programs go into `answers`."""
+    finished: list[Fit] = []
+    for fit in fits:
+        sure = max((answer.score for answer in answers), default=0.0) >= NEEDED
+        if sure and len(answers) >= session.config.top and worth(fit) < _RIVAL * worth(finished[0]):
+            break
+        if len(finished) >= max(_MOST_FINISHED, session.config.top) or (finished and not session.go_on()):
+            break
+        if any(_same(session.evidence, pattern, fit, other) for other in finished):
+            continue
+        session.tell("reading off the objects", 0.8 + 0.05 * len(finished))
+        finished.append(fit)
+        answer = _finished(session, pattern, fit)
+        if answer is not None:
+            answers.append(answer)
 
 
 def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
