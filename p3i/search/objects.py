@@ -10,7 +10,7 @@ from torch import Tensor
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.pattern import Pattern
-from p3i.search.cells import contrast, sample_grid
+from p3i.search.cells import contrast, sample_grid, sample_points
 from p3i.search.evidence import Evidence, Level
 from p3i.search.extent import find_extent
 from p3i.search.grow import SUPPORT, Fit, sane, side_of_cell
@@ -97,12 +97,23 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
 
 
 def filling_layout(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
-    """The layout continued over the whole picture, as the paper assumes (section 3.4)."""
+    """The layout continued over the whole picture, as the paper assumes (section 3.4).
+
+    All objects whose middle lies in the picture are drawn, also those whose cell the frame cuts.
+    """
     theta = layout.lattice.theta(pattern)
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
-    index = cells_in_view(level, pattern, theta, most=4000).numpy().astype(int)
-    if len(index) == 0:
+    cells = cells_in_view(level, pattern, theta, most=4000)
+    if len(cells) == 0:
         return layout
+    first, last = cells.min(0).values - 1, cells.max(0).values + 1
+    around = torch.cartesian_prod(
+        *(torch.arange(int(a), int(b) + 1).double() for a, b in zip(first, last, strict=True))
+    )
+    points, in_front = sample_points(level, pattern, theta, around)
+    limits = torch.tensor([level.size.width - 0.5, level.size.height - 0.5])
+    seen = in_front & (points >= -0.5).all(1) & (points <= limits).all(1)
+    index = torch.cat([cells, around[seen]]).numpy().astype(int)
     low, high = index.min(0), index.max(0) + 1
     return Layout(layout.lattice, (int(low[0]), int(high[0])), (int(low[1]), int(high[1])))
 
