@@ -1,4 +1,4 @@
-"""How well a program explains a photo: the paper's loss against a loop, a score that tells right from wrong."""
+"""How well a program explains a photo: equation 2 against a loop, and a score for right and wrong."""
 
 import math
 from dataclasses import replace

@@ -1,0 +1,288 @@
+"""From a photo to its program, on scenes of known truth, and the honest answer where there is none."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from truth import PATTERN, SMALL, evidence_of, lattice_error, lattice_of, pose_error_deg, small_scene
+
+from p3i.evaluation.scenes import Scene
+from p3i.grammar.parser import parse
+from p3i.grammar.printer import format_program
+from p3i.grammar.strict import departures
+from p3i.interp.camera import Camera
+from p3i.search import lattices
+from p3i.search.config import SearchConfig
+from p3i.search.grow import measure
+from p3i.search.result import NEEDED, StopReason, SynthesisResult
+from p3i.search.synthesize import focal_of, synthesize
+from p3i.size import Size
+from p3i.vision.image import Image
+
+SEEDS = (3, 7, 10, 14, 15, 18)
+QUICK = 14
+"""The scene on which options are tried."""
+MANY_TRIES = 3
+"""A scene of which more than one proposal is refined."""
+
+
+@cache
+def answer(scene: int, **options: Any) -> SynthesisResult:
+    return synthesize(small_scene(scene).image(), SearchConfig(**options))
+
+
+def text_of(result: SynthesisResult) -> str:
+    assert result.program is not None, result.reason
+    return format_program(result.program)
+
+
+def steps_away(scene: Scene, result: SynthesisResult) -> np.ndarray:
+    """How far from each true object the answer's nearest lies, in spacings of the true objects there."""
+    found = np.array([(x, y) for x, y, _, _ in result.centers])
+    away = np.linalg.norm(scene.centers_px[:, None] - found[None], axis=2).min(1)
+    apart = np.linalg.norm(scene.centers_px[:, None] - scene.centers_px[None], axis=2)
+    return away / np.where(apart > 0, apart, np.inf).min(1)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_program_of_a_scene_is_found(seed: int) -> None:
+    scene, result = small_scene(seed), answer(seed)
+    assert result.stop is StopReason.FOUND and result.reason == ""
+    assert result.program is not None and result.score is not None
+    assert NEEDED <= result.score <= 1
+    assert pose_error_deg(result.program, scene.program) < 1
+    found, truth = lattice_of(result.program), lattice_of(scene.program)
+    assert lattice_error(found.basis, truth.basis) < 0.1
+    away = steps_away(scene, result)
+    assert np.median(away) < 0.1
+    assert (away < 0.25).mean() > 0.9, "objects of the scene are missing"
+    assert len(result.centers) < 1.15 * len(scene.index), "objects where the scene has none"
+
+
+def test_the_centres_are_those_that_the_program_draws_in_the_photo() -> None:
+    result = answer(QUICK)
+    assert result.program is not None
+    lattice = lattice_of(result.program)
+    matrix = Camera.of(result.program).image_from_plane(SMALL).numpy()
+    for x, y, i, j in result.centers:
+        at = matrix @ [*(lattice.origin + np.array([i, j]) @ lattice.basis), 1.0]
+        np.testing.assert_allclose([x, y], at[:2] / at[2], atol=1e-6)
+        assert -0.5 <= x <= SMALL.width - 0.5 and -0.5 <= y <= SMALL.height - 0.5
+
+
+def test_the_same_photo_and_options_give_the_same_text_twice() -> None:
+    again = synthesize(small_scene(QUICK).image(), SearchConfig())
+    assert text_of(again) == text_of(answer(QUICK))
+    assert again == answer(QUICK)
+
+
+def test_another_seed_finds_the_same_lattice() -> None:
+    other, first = answer(QUICK, seed=5), answer(QUICK)
+    assert other.seed == 5
+    assert other.program is not None and first.program is not None
+    assert lattice_error(lattice_of(other.program).basis, lattice_of(first.program).basis) < 0.05
+    assert pose_error_deg(other.program, first.program) < 0.5
+
+
+def noise() -> np.ndarray:
+    return np.random.default_rng(0).uniform(size=(240, 320, 3)).astype(np.float32)
+
+
+def gradient() -> np.ndarray:
+    y, x = np.mgrid[0:240, 0:320] / 320
+    return np.stack([0.3 + 0.5 * y, 0.7 - 0.4 * x, 0.2 + 0.3 * (x + y)], -1).astype(np.float32)
+
+
+def photo(pixels: np.ndarray, valid: np.ndarray | None = None) -> Image:
+    return Image(pixels, np.ones(pixels.shape[:2], bool) if valid is None else valid)
+
+
+@pytest.mark.parametrize("pixels", [noise(), gradient()], ids=["noise", "gradient"])
+def test_what_has_no_pattern_is_refused_with_its_score(pixels: np.ndarray) -> None:
+    result = synthesize(photo(pixels), SearchConfig())
+    assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
+    assert result.centers == () and result.candidates == ()
+    assert result.score is not None and result.score < NEEDED == result.needed
+    assert result.reason == f"no regular pattern (best {result.score:.2f}, needs {NEEDED:.2f})"
+
+
+@pytest.mark.parametrize(
+    ("image", "reason"),
+    [
+        (photo(np.full((240, 320, 3), 0.4, np.float32)), StopReason.FLAT),
+        (photo(np.zeros((1, 1, 3), np.float32)), StopReason.TOO_SMALL),
+        (photo(noise()[:31]), StopReason.TOO_SMALL),
+        (photo(noise(), np.zeros((240, 320), bool)), StopReason.TOO_LITTLE_KNOWN),
+        (photo(noise(), np.arange(240 * 320).reshape(240, 320) < 5000), StopReason.TOO_LITTLE_KNOWN),
+    ],
+    ids=["flat", "pixel", "strip", "unknown", "nearly unknown"],
+)
+def test_a_hopeless_picture_is_not_searched(image: Image, reason: StopReason) -> None:
+    result = synthesize(image, SearchConfig(), trace=lambda step: pytest.fail(f"searched: {step}"))
+    assert (result.program, result.stop) == (None, reason)
+    assert result.reason == reason.value != ""
+
+
+def test_when_the_time_is_up_the_answer_says_so() -> None:
+    result = answer(QUICK, time_s=1e-6)
+    assert result.stop is StopReason.TIME_UP
+    assert result.program is None or result.score is not None
+    assert "time" in result.reason
+
+
+class Interrupt:
+    """Progress that interrupts the search when it does `doing` for the `turn`-th time."""
+
+    def __init__(self, doing: str, *, turn: int = 1) -> None:
+        self.doing, self.left = doing, turn
+
+    def __call__(self, doing: str, share: float) -> None:
+        assert 0 <= share <= 1
+        self.left -= doing == self.doing
+        if self.left == 0:
+            self.left = -1
+            raise KeyboardInterrupt
+
+
+def test_an_interrupt_before_anything_was_found_ends_without_a_program() -> None:
+    result = synthesize(small_scene(QUICK).image(), SearchConfig(), progress=Interrupt("straightening"))
+    assert (result.program, result.stop) == (None, StopReason.INTERRUPTED)
+
+
+def test_an_interrupt_gives_the_best_so_far() -> None:
+    scene = small_scene(MANY_TRIES)
+    result = synthesize(scene.image(), SearchConfig(), progress=Interrupt("refining", turn=2))
+    assert result.stop is StopReason.INTERRUPTED
+    assert result.program is not None and result.score is not None and result.score >= NEEDED
+    assert pose_error_deg(result.program, scene.program) < 1
+
+
+def test_an_interrupt_while_a_runner_up_is_worked_out_keeps_the_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = small_scene(QUICK)
+    theta = lattice_of(scene.program).moved_to(np.median(scene.index, axis=0).round()).theta(PATTERN)
+    fit = measure(evidence_of(scene).level_for(40.0), PATTERN, theta)
+    monkeypatch.setattr(lattices, "_grow_all", lambda session, pattern, fits: fits.extend([fit, fit]))
+    monkeypatch.setattr(lattices, "_same", lambda *_: False)
+    stop = Interrupt("reading off the objects", turn=2)
+    result = synthesize(scene.image(), SearchConfig(top=2), progress=stop)
+    assert stop.left < 0, "the search should come that far"
+    assert result.stop is StopReason.INTERRUPTED
+    assert result.program is not None and pose_error_deg(result.program, scene.program) < 1
+
+
+def test_progress_tells_what_is_done_and_never_goes_back() -> None:
+    told: list[tuple[str, float]] = []
+    steps: list[Mapping[str, Any]] = []
+    scene = small_scene(QUICK)
+    result = synthesize(
+        scene.image(), SearchConfig(top=3), progress=lambda *said: told.append(said), trace=steps.append
+    )
+    shares = [share for _, share in told]
+    assert shares == sorted(shares) and told[-1] == ("done", 1.0)
+    assert all(doing for doing, _ in told)
+    # The trace: plain numbers and lists, a step of each kind.
+    assert json.loads(json.dumps(steps)) == steps
+    assert {step["step"] for step in steps} >= {"proposal", "fit", "answer"}
+    assert max(step["score"] for step in steps if step["step"] == "answer") == pytest.approx(result.score)
+    # The candidates: distinct programs, the first of them the answer.
+    texts = [format_program(candidate.program) for candidate in result.candidates]
+    assert 1 <= len(texts) <= 3 and len(set(texts)) == len(texts)
+    assert result.candidates[0].program == result.program and result.candidates[0].score == result.score
+    assert all(NEEDED <= candidate.score <= 1 for candidate in result.candidates)
+    assert text_of(result) == text_of(answer(QUICK)), "asking for more candidates changes no answer"
+
+
+def test_what_a_mask_hides_is_no_evidence() -> None:
+    scene = small_scene(10)
+    image, outline = scene.image(), cv2.convexHull(scene.centers_px.astype(np.float32))
+    hidden = np.zeros(image.valid.shape, np.uint8)
+    cv2.fillConvexPoly(hidden, outline.round().astype(np.int32), 1)
+    hidden = cv2.dilate(hidden, np.ones((61, 61), np.uint8)).astype(bool)
+    assert (~hidden).mean() > 0.4, "the scene should be one that leaves some ground to see"
+    assert answer(10).program is not None
+    result = synthesize(Image(image.pixels, ~hidden), SearchConfig())
+    assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
+
+
+def test_a_mask_over_a_part_leaves_the_rest_of_the_pattern() -> None:
+    scene = small_scene(QUICK)
+    image, valid = scene.image(), np.ones((SMALL.height, SMALL.width), bool)
+    pixels = image.pixels.copy()
+    valid[110:220, 150:300] = False
+    pixels[~valid] = np.random.default_rng(3).uniform(size=(int((~valid).sum()), 3))
+    result = synthesize(Image(pixels, valid), SearchConfig())
+    assert result.program is not None
+    assert pose_error_deg(result.program, scene.program) < 1
+    assert (steps_away(scene, result) < 0.25).mean() > 0.85
+
+
+def test_another_focal_is_another_pose_and_the_same_objects() -> None:
+    scene, other = small_scene(QUICK), answer(QUICK, focal_mm=60.0)
+    assert (other.focal_mm, other.focal_source) == (60.0, "option")
+    assert (answer(QUICK).focal_mm, answer(QUICK).focal_source) == (35.0, "default")
+    assert other.program is not None
+    assert pose_error_deg(other.program, scene.program) > 3
+    found = np.array([(x, y) for x, y, _, _ in other.centers])
+    first = np.array([(x, y) for x, y, _, _ in answer(QUICK).centers])
+    nearest = np.linalg.norm(first[:, None] - found[None], axis=2).min(1)
+    assert np.median(nearest) < 2
+
+
+def test_the_focal_is_that_of_the_option_then_of_the_photo() -> None:
+    image = small_scene(QUICK).image()
+    exif = replace(image, focal_mm=28.0)
+    assert focal_of(image, SearchConfig()) == (35.0, "default")
+    assert focal_of(exif, SearchConfig()) == (28.0, "exif")
+    assert focal_of(exif, SearchConfig(focal_mm=50.0)) == (50.0, "option")
+
+
+def test_extent_image_fills_the_picture_with_the_same_lattice() -> None:
+    found, filled = answer(QUICK), answer(QUICK, extent="image")
+    assert found.program is not None and filled.program is not None
+    assert np.array_equal(lattice_of(filled.program).basis, lattice_of(found.program).basis)
+    assert filled.program.camera == found.program.camera
+    assert len(filled.centers) >= len(found.centers)
+    at = np.array([(x, y) for x, y, _, _ in filled.centers])
+    assert at[:, 0].min() < 0.2 * SMALL.width and at[:, 0].max() > 0.8 * SMALL.width
+    assert at[:, 1].min() < 0.2 * SMALL.height and at[:, 1].max() > 0.8 * SMALL.height
+
+
+def test_a_strict_answer_is_a_string_of_table_1_and_says_how_far_it_is_off() -> None:
+    strict, free = answer(QUICK, strict=True), answer(QUICK)
+    assert strict.program is not None and free.program is not None
+    assert departures(strict.program) == ()
+    assert parse(format_program(strict.program, layout="table1"), strict=True) == strict.program
+    assert strict.program.camera == free.program.camera
+    assert len(strict.notes) == 1 and "pixels from the free fit" in strict.notes[0]
+    # It goes through the middle of the picture, and has as many objects (but for those that left the frame).
+    assert np.array_equal(lattice_of(strict.program).origin, np.zeros(2))
+    middle = np.array(SMALL.middle)
+    assert min(np.linalg.norm(np.array([x, y]) - middle) for x, y, _, _ in strict.centers) < 1e-6
+    assert abs(len(strict.centers) - len(free.centers)) <= 0.35 * len(free.centers)
+
+
+def test_a_chequered_floor_is_answered_with_squares_of_one_colour() -> None:
+    size = Size(400, 300)
+    camera = Camera(-40.0, 8.0)
+    x, y = np.meshgrid(np.arange(2 * size.width), np.arange(2 * size.height))
+    photo_px = np.stack([(x.ravel() + 0.5) / 2 - 0.5, (y.ravel() + 0.5) / 2 - 0.5, np.ones(x.size)])
+    plane = np.linalg.inv(camera.image_from_plane(size).numpy()) @ photo_px
+    dark = np.floor(plane[:2] / plane[2] / 7.0).sum(0) % 2 == 0
+    grey = cv2.resize(
+        np.where(dark, 0.25, 0.75).reshape(x.shape).astype(np.float32),
+        (400, 300),
+        interpolation=cv2.INTER_AREA,
+    )
+    noisy = grey[:, :, None] + np.random.default_rng(0).normal(0, 0.01, (300, 400, 3))
+    result = synthesize(photo(noisy.clip(0, 1).astype(np.float32)), SearchConfig())
+    assert result.program is not None
+    found = lattice_of(result.program)
+    assert pose_error_deg(found, replace(found, rx_deg=camera.rx_deg, ry_deg=camera.ry_deg)) < 1
+    assert lattice_error(found.basis, np.array([[7.0, 7.0], [7.0, -7.0]])) < 0.05
