@@ -19,12 +19,15 @@ _MOST_PROPOSALS = 10
 _MOST_GROWN = 7
 # Fits of this worth are certain enough that only a better one could matter; after one more try without
 # one the search goes on to finish it.
-_CERTAIN = 0.05
+_CERTAIN = 0.025
 _TRIES_WHEN_CERTAIN = 1
 # A runner-up is finished too where its worth is at least this share of the best.
 _RIVAL = 0.5
 # A pattern of n cells counts as if it had _FEW_CELLS fewer: the numbers and the mean cell take their part.
 _FEW_CELLS = 10
+# Below that number they still count a little, so that a pattern of few cells wins where there is no other.
+_DOUBT = 0.05
+_LEAST_CELLS = 4
 _LAST_ROUNDS = 4
 # So many fits are worked out to programs before the search gives up.
 _MOST_FINISHED = 3
@@ -48,9 +51,13 @@ def find_lattices(session: Session) -> list[Answer]:
 
 
 def worth(fit: Fit) -> float:
-    """How much of the photo a fit explains, less what few cells explain by chance."""
-    count = int(fit.support.sum())
-    return fit.score * max(0.0, 1 - _FEW_CELLS / max(count, 1)) + 1e-3 * fit.score
+    """How much of the photo a fit explains, and how well, less what few cells explain by chance."""
+    contrast = fit.contrast[fit.support]
+    count = len(contrast)
+    if count < _LEAST_CELLS:
+        return 0.0
+    beyond_chance = max(1 - _FEW_CELLS / count, _DOUBT * (1 - _LEAST_CELLS / count))
+    return fit.score * float(contrast.mean()) * beyond_chance
 
 
 def _grow_all(session: Session, pattern: Pattern, fits: list[Fit]) -> None:
@@ -69,7 +76,7 @@ def _grow_all(session: Session, pattern: Pattern, fits: list[Fit]) -> None:
         fit = grow(session.evidence, pattern, proposal, generator=session.generator)
         grown += 1
         _record(session, pattern, proposal, fit)
-        if fit is None or int(fit.support.sum()) < 4:
+        if fit is None or int(fit.support.sum()) < _LEAST_CELLS:
             continue
         better = worth(fit) > max((worth(other) for other in fits), default=0.0)
         fits.append(fit)
@@ -96,7 +103,7 @@ def _finish_all(session: Session, pattern: Pattern, fits: list[Fit], answers: li
             break
         if len(finished) >= max(_MOST_FINISHED, session.config.top) or (finished and not session.go_on()):
             break
-        if any(_same(session.evidence, pattern, fit, other) for other in finished):
+        if sure and any(_same(session.evidence, pattern, fit, other) for other in finished):
             continue
         session.tell("reading off the objects", 0.8 + 0.05 * len(finished))
         finished.append(fit)
@@ -115,13 +122,23 @@ def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
     last = follow(
         evidence, pattern, theta, selected, generator=session.generator, rounds=_LAST_ROUNDS, finest=True
     )
-    if last is None or int(last.support.sum()) < 4:
+    if last is None or int(last.support.sum()) < _LEAST_CELLS:
         return None
-    theta, ground = primitive(evidence, pattern, last) or (last.theta, last.index[last.support])
-    layout = found_layout(evidence, Lattice.of(pattern, theta), ground)
-    if layout is None:
-        return None
-    return _answer(session, pattern, refitted(evidence, pattern, layout))
+    cells = [(last.theta, last.index[last.support])]
+    other = primitive(evidence, pattern, last)
+    if other is not None:
+        cells.insert(0, other)
+    best: Answer | None = None
+    for theta, ground in cells:
+        layout = found_layout(evidence, Lattice.of(pattern, theta), ground)
+        if layout is None:
+            continue
+        answer = _answer(session, pattern, refitted(evidence, pattern, layout))
+        if answer is not None and (best is None or answer.score > best.score):
+            best = answer
+        if best is not None and best.score >= NEEDED:
+            break
+    return best
 
 
 def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None:
@@ -145,8 +162,8 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
 
 def _explained(evidence: Evidence, pattern: Pattern, proposal: Proposal, fit: Fit) -> bool:
     """Whether a fit holds the proposal's lattice already, or one that it is part of."""
-    if worth(fit) < 0.3 * _CERTAIN:
-        return False
+    if worth(fit) < _CERTAIN:
+        return False  # another start may do better
     level = evidence.level_for(100.0)
     wide = proposal.lattice.theta(pattern)
     if not proposal.local:
