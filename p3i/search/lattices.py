@@ -147,7 +147,7 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     if measured is None:
         return None
     count = len(measured.index)
-    score = score_of(float(measured.contrast.clamp(min=0).mean()), count)
+    score = score_of(measured.contrast)
     if session.config.extent == "image":
         layout = filling_layout(session.evidence, pattern, layout)
     notes: tuple[str, ...] = ()

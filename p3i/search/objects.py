@@ -17,6 +17,7 @@ from p3i.search.grow import SUPPORT, Fit, sane, side_of_cell
 from p3i.search.lattice import Lattice, cell_areas, cells_in_view, map_from_index
 from p3i.search.phase import find_phase
 from p3i.search.register import find_instances, fit_instances
+from p3i.search.score import score_of
 
 # Numbers in a program: angles to a thousandth of a degree, lengths to a ten-thousandth of a unit, which is
 # a hundredth of a pixel at the far end of a long row in a large photo.
@@ -91,8 +92,8 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
         return None
     lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, phase.origin)
     found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
-    if found is None:
-        return None
+    if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
+        return None  # one row fixes no plane
     return Layout(lattice, found.i_range, found.j_range, found.guards)
 
 
@@ -145,7 +146,7 @@ def layout_fit(evidence: Evidence, pattern: Pattern, layout: Layout) -> Fit | No
     features = evidence.config.features
     names = [features] if "rgb" in features.split("+") else [features, features + "+rgb"]
     fits = [_measured(evidence.level_for(side, name=name), pattern, layout, theta) for name in names]
-    return max((fit for fit in fits if fit is not None), key=lambda fit: fit.score, default=None)
+    return max((fit for fit in fits if fit is not None), key=lambda fit: score_of(fit.contrast), default=None)
 
 
 def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> Fit | None:
@@ -154,7 +155,9 @@ def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> 
     if len(index) < 4:
         return None
     index = index[:: len(index) // 600 + 1]
-    found = contrast(level, pattern, theta, index, weights=torch.ones(len(index)), grid=sample_grid(_SAMPLES))
+    found = contrast(
+        level, pattern, theta, index, weights=torch.ones(len(index)), grid=sample_grid(_SAMPLES), rounds=4
+    )
     area, _ = cell_areas(map_from_index(level, pattern, theta), index, level)
     share = (area / (level.size.width * level.size.height)).float()
     score = float((share * (found.contrast - SUPPORT).clamp(min=0)).sum())

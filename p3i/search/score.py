@@ -19,6 +19,9 @@ from p3i.vision.warp import sample, sample_valid
 
 _SAMPLES = 6
 _MOST_CELLS = 600
+_ROUNDS = 4
+# What so many cells explain, chance explains too.
+_FEW = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +67,7 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
     features = evidence.config.features
     names = [features] if "rgb" in features.split("+") else [features, features + "+rgb"]
     side = _cell_px(evidence, pattern, index)
-    means = []
+    scores = []
     for name in names:
         found = contrast(
             evidence.level_for(side, name=name),
@@ -74,14 +77,21 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
             weights=torch.ones(len(index)),
             grid=sample_grid(_SAMPLES),
             half_steps=_half_steps(pattern),
+            rounds=_ROUNDS,
         )
-        means.append(float(found.contrast.clamp(min=0).mean()))
-    return score_of(max(means), len(index))
+        scores.append(score_of(found.contrast))
+    return max(scores)
 
 
-def score_of(mean_contrast: float, count: int) -> float:
-    """The normalised score of `count` cells: eight numbers are fitted, which is what four cells give."""
-    return mean_contrast * max(0.0, 1 - 4 / max(count, 1))
+def score_of(contrast: torch.Tensor) -> float:
+    """The normalised score, 0 to 1, of cells with this contrast [N].
+
+    A cell that looks more like its half-way neighbour speaks against the pattern, but by half only, since
+    something may lie on it. Few cells agree by chance, and eight numbers are fitted to them.
+    """
+    count = max(len(contrast), _FEW)
+    mean = float((contrast.clamp(min=0) + 0.5 * contrast.clamp(max=0)).mean())
+    return max(0.0, mean * (1 - _FEW / count))
 
 
 def _equation2(
