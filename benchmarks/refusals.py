@@ -10,6 +10,7 @@ but downloads nothing.
 import argparse
 import sys
 import time
+import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -81,11 +82,19 @@ def photos(folder: Path) -> Iterator[tuple[str, Image]]:
 
 
 def measure(images: Iterable[tuple[str, Image]], config: SearchConfig) -> list[float]:
-    """The best score seen on each image, 0 where the search proposed nothing; a line for each."""
+    """The best score seen on each image, 0 where the search proposed nothing; a line for each.
+
+    An image on which the search breaks off is a bug: it is named and left out.
+    """
     scores: list[float] = []
     for name, image in images:
         begun = time.process_time()
-        result = p3i.synth(image, config)
+        try:
+            result = p3i.synth(image, config)
+        except Exception as bug:
+            print(f"{name:40} BUG {type(bug).__name__}: {bug}", flush=True)
+            traceback.print_exc()
+            continue
         seconds = time.process_time() - begun
         scores.append(result.score or 0.0)
         said = "answered" if result.program is not None else result.stop.name.lower()
