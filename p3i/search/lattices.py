@@ -45,8 +45,10 @@ def find_lattices(session: Session) -> list[Answer]:
     answers: list[Answer] = []
     try:
         _finish_all(session, pattern, fits, answers)
-    except KeyboardInterrupt:  # what is finished by now is kept
+    except KeyboardInterrupt:  # what is finished by now is kept, and the best is worth the wait
         session.stopped = StopReason.INTERRUPTED
+        if fits and not answers:
+            _finish_all(session, pattern, fits[:1], answers)
     return sorted(answers, key=lambda answer: -answer.worth)
 
 
@@ -143,6 +145,10 @@ def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
 
 def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None:
     """The program of a layout with its score, under the options that change what is drawn."""
+    notes: tuple[str, ...] = ()
+    if session.config.strict:
+        free, (layout, moved) = layout, strict_layout(layout)
+        notes = (_strict_note(free, layout, moved * session.evidence.image.size.unit_px),)
     measured = layout_fit(session.evidence, pattern, layout)
     if measured is None:
         return None
@@ -150,14 +156,16 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     score = score_of(measured.contrast)
     if session.config.extent == "image":
         layout = filling_layout(session.evidence, pattern, layout)
-    notes: tuple[str, ...] = ()
-    if session.config.strict:
-        layout, moved = strict_layout(layout)
-        pixels = moved * session.evidence.image.size.unit_px
-        notes = (f"Table 1 has no constants: the objects lie {pixels:.1f} pixels from the free fit",)
     session.record("answer", cells=count, score=score, worth=worth(measured))
     program = layout.program(from_zero=not session.config.strict)
     return Answer(program, "lattice", score, worth(measured), notes)
+
+
+def _strict_note(free: Layout, strict: Layout, moved_px: float) -> str:
+    """What Table 1 cost an answer: how far its objects moved, and the outline that it cannot say."""
+    note = f"Table 1 has no constants: the objects lie {moved_px:.1f} pixels from the free fit"
+    lost = len(free.guards) - len(strict.guards)
+    return f"{note}, and {lost} of its {len(free.guards)} guards cannot be said" if lost else note
 
 
 def _explained(evidence: Evidence, pattern: Pattern, proposal: Proposal, fit: Fit) -> bool:

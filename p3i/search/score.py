@@ -12,7 +12,7 @@ from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import distinct, edges
 from p3i.search.cells import HALF_STEPS, contrast, sample_grid
 from p3i.search.config import SearchConfig
-from p3i.search.evidence import Evidence, Level
+from p3i.search.evidence import FINE, Evidence, Level
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
 from p3i.vision.warp import sample, sample_valid
@@ -97,10 +97,9 @@ def score_of(contrast: torch.Tensor) -> float:
 def _equation2(
     evidence: Evidence, pattern: Pattern, points: torch.Tensor, seen: torch.Tensor
 ) -> tuple[float, int]:
-    """The loss as printed, on the features at the photo's own size up to the fine map, and its pairs."""
-    features = evidence.features(max(1, evidence.image.size.longer))
-    matrix = features.map_from_photo
-    at, _ = project(matrix, points)
+    """The loss as printed, on the features of the fine map, and the number of its pairs."""
+    features = evidence.features(FINE)
+    at, _ = project(features.map_from_photo, points)
     known = seen & sample_valid(features.valid, at.float())
     pairs = pattern.edges[known[pattern.edges].all(1)]
     values = sample(features.values, at.float())

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from truth import SMALL, evidence_of, small_scene
 
 from p3i.errors import ProgramError
@@ -178,8 +179,20 @@ def test_a_mask_takes_objects_out_of_the_loss() -> None:
 
 
 def test_few_objects_get_less_than_many() -> None:
-    assert [score_of(0.8, count) for count in (0, 3, 4)] == [0, 0, 0]
-    assert 0 < score_of(0.8, 8) < score_of(0.8, 40) < 0.8
+    def alike(count: int) -> float:
+        return score_of(torch.full((count,), 0.8))
+
+    assert [alike(count) for count in (1, 3, 6)] == [0, 0, 0]
+    assert 0 < alike(8) < alike(40) < 0.8
+
+
+def test_cells_against_the_pattern_count_half() -> None:
+    contrast = torch.full((60,), 0.5)
+    hidden, against = contrast.clone(), contrast.clone()
+    hidden[:30], against[:30] = 0, -0.5
+    assert score_of(hidden) == pytest.approx(score_of(contrast) / 2)
+    assert score_of(against) == pytest.approx(score_of(contrast) / 4)
+    assert score_of(-contrast) == 0
 
 
 def test_the_evidence_makes_a_map_once() -> None:
