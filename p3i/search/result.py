@@ -34,7 +34,7 @@ class StopReason(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """One program that the search weighed, with its normalised score (docs/geometry.md)."""
+    """One program that the search weighed, with its normalised score (docs/search.md)."""
 
     program: Program
     score: float
