@@ -13,9 +13,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
-from p3i.search.cells import contrast, mean_cell, read_cells, sample_grid
-from p3i.search.evidence import Evidence, Level
+from p3i.search.cells import HALF_STEPS, agreement, contrast, mean_cell, read_cells, sample_grid
+from p3i.search.evidence import COARSE, Evidence, Level
 from p3i.search.lattice import (
     PHASE,
     Lattice,
@@ -174,8 +175,6 @@ def _local_seed(
 
 def _tilts() -> list[tuple[float, float]]:
     """Poses around the frontal one: each tilt of _TILTS_DEG in eight directions."""
-    from p3i.interp.camera import Camera
-
     poses = []
     for tilt, around in itertools.product(_TILTS_DEG, range(8)):
         if tilt == 0 and around:
@@ -195,8 +194,6 @@ def _mean_energy(values: Tensor, known: Tensor) -> Tensor:
 
 def _neighbour_contrast(level: Level, pattern: Pattern, theta: Tensor, index: Tensor) -> Tensor:
     """Agreement of each cell with its four neighbours less that with its half steps, [N]: needs no mean."""
-    from p3i.search.cells import HALF_STEPS, agreement
-
     grid = sample_grid(_SAMPLES)
     cells = read_cells(level, pattern, theta, index, grid)
 
@@ -264,7 +261,7 @@ def _sample_of(count: int, generator: torch.Generator) -> Tensor:
 
 def side_of_cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:
     """The side of the cell at the origin, in photo pixels."""
-    return cell_px(evidence.level(320, blur=0.5), pattern, theta)
+    return cell_px(evidence.level(COARSE, blur=0.5), pattern, theta)
 
 
 def sane(pattern: Pattern, theta: Tensor) -> bool:
