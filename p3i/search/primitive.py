@@ -142,7 +142,7 @@ def _likeness(
     `unless_alike` those in which all cells are alike have none either.
     """
     kinds = np.unique(coset)
-    if min(int((coset == kind).sum()) for kind in kinds) < 3:
+    if len(kinds) < 2 or min(int((coset == kind).sum()) for kind in kinds) < 3:
         return 1.0
     every = max(1, len(coset) // (_MOST_CELLS * len(kinds)))
     side = side_of_cell(evidence, pattern, ground.theta)

@@ -104,3 +104,15 @@ def test_too_few_cells_say_nothing() -> None:
     fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
     few = Fit(fit.theta, fit.index[:3], fit.contrast[:3], fit.areas[:3], fit.score)
     assert primitive(evidence_of(scene), PATTERN, few) is None
+
+
+def test_cells_of_a_single_coset_tell_nothing_apart() -> None:
+    scene = small_scene(16)
+    truth = Lattice.of(PATTERN, true_theta(scene))
+    fit = fit_of(evidence_of(scene), truth)
+    row = fit.index[fit.index[:, 1] == fit.index[:, 1].median()]
+    assert len(row) >= 4
+    ones = torch.ones(len(row))
+    single = Fit(fit.theta, row, ones, ones, fit.score)
+    # Every second row of one row holds all of it or none.
+    assert primitive(evidence_of(scene), PATTERN, single) is None
