@@ -11,7 +11,7 @@ from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit, measure, side_of_cell
 from p3i.search.lattice import Lattice
-from p3i.search.primitive import primitive
+from p3i.search.primitive import _Ground, _likeness, primitive
 from p3i.size import Size
 from p3i.vision.image import Image
 
@@ -108,11 +108,6 @@ def test_too_few_cells_say_nothing() -> None:
 
 def test_cells_of_a_single_coset_tell_nothing_apart() -> None:
     scene = small_scene(16)
-    truth = Lattice.of(PATTERN, true_theta(scene))
-    fit = fit_of(evidence_of(scene), truth)
-    row = fit.index[fit.index[:, 1] == fit.index[:, 1].median()]
-    assert len(row) >= 4
-    ones = torch.ones(len(row))
-    single = Fit(fit.theta, row, ones, ones, fit.score)
-    # Every second row of one row holds all of it or none.
-    assert primitive(evidence_of(scene), PATTERN, single) is None
+    fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
+    ground = _Ground(fit.theta, index_in(scene))
+    assert _likeness(evidence_of(scene), PATTERN, ground, np.zeros(len(ground.index), int)) == 1.0
