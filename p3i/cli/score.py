@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import options
-from p3i.search.config import SearchConfig, default, sentence
+from p3i.cli import options, search_options
+from p3i.search.config import SearchConfig
 
 
 @click.command("score", short_help="Say how well a program explains a photo.")
@@ -29,16 +29,10 @@ from p3i.search.config import SearchConfig, default, sentence
     metavar="MM",
     help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
 )
-@click.option(
-    "--features",
-    metavar="NAME",
-    default=default("features"),
-    show_default=True,
-    help=sentence("features"),
-)
-@click.option("--weights", type=click.Path(), metavar="FILE", help=sentence("weights"))
-@click.option("--device", default=default("device"), show_default=True, help=sentence("device"))
-@click.option("--threads", type=int, default=default("threads"), show_default=True, help=sentence("threads"))
+@search_options.features
+@search_options.weights
+@search_options.device
+@search_options.threads
 @options.error_format
 def command(
     image: str, program: str, form: str, weights: str | None, error_format: str, **chosen: Any

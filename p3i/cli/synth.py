@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from p3i import api, files
-from p3i.cli import options, progress, report
+from p3i.cli import options, progress, report, search_options
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
 from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, sentence
@@ -51,20 +51,14 @@ from p3i.search.result import StopReason, SynthesisResult
     help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
 )
 @click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
-@click.option(
-    "--features",
-    metavar="NAME",
-    default=default("features"),
-    show_default=True,
-    help=sentence("features"),
-)
-@click.option("--weights", type=click.Path(), metavar="FILE", help=sentence("weights"))
+@search_options.features
+@search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
 @click.option("--top", type=int, metavar="K", default=default("top"), show_default=True, help=sentence("top"))
 @click.option("--seed", type=int, default=default("seed"), show_default=True, help=sentence("seed"))
-@click.option("--device", default=default("device"), show_default=True, help=sentence("device"))
-@click.option("--threads", type=int, default=default("threads"), show_default=True, help=sentence("threads"))
+@search_options.device
+@search_options.threads
 @click.option("--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height).")
 @click.option("--trace", type=click.Path(), metavar="FILE", help="Write the search's steps, JSON lines.")
 @options.quiet

@@ -20,6 +20,8 @@ from p3i.vision.warp import sample, sample_valid
 
 HALF_STEPS = torch.tensor([[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], dtype=torch.float64)
 """The half steps of a two-directional index."""
+SIDE = 6
+"""Samples along a cell's side wherever cells are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +32,7 @@ class Cells:
     known: Tensor
 
 
-def sample_grid(side: int) -> Tensor:
+def sample_grid(side: int = SIDE) -> Tensor:
     """`side` x `side` offsets (a, b) that sweep a cell evenly, [side * side, 2] within (-1/2, 1/2)."""
     steps = (torch.arange(side, dtype=torch.float64) + 0.5) / side - 0.5
     return torch.cartesian_prod(steps, steps)

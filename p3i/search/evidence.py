@@ -95,6 +95,11 @@ class Evidence:
             self._levels[key] = _level(self, self.features(longer, name=name), 2.0**step)
         return self._levels[key]
 
+    @property
+    def frame(self) -> Level:
+        """The map to measure places and sizes on: the coarse one as it is, which every search makes first."""
+        return self.level(COARSE, blur=0.5)
+
     def level_for(self, cell_px: float, *, finest: bool = False, name: str | None = None) -> Level:
         """The map on which cells of `cell_px` photo pixels a side are compared best."""
         scale = min(1.0, COARSE / self.image.size.longer)

@@ -16,7 +16,7 @@ from torch import Tensor
 from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import HALF_STEPS, agreement, contrast, mean_cell, read_cells, sample_grid
-from p3i.search.evidence import COARSE, Evidence, Level
+from p3i.search.evidence import Evidence, Level
 from p3i.search.lattice import (
     PHASE,
     Lattice,
@@ -35,7 +35,6 @@ SUPPORT = 0.12
 # Growth looks this many cells beyond those that agree.
 _REACH = 2
 _ROUNDS = 9
-_SAMPLES = 6
 # More cells than this are not needed for one step of the refinement.
 _MOST_REFINED = 160
 # The tilts under which a proposal without one is tried.
@@ -63,9 +62,7 @@ class Fit:
         return self.contrast > SUPPORT
 
 
-def measure(
-    level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | None = None, samples: int = _SAMPLES
-) -> Fit | None:
+def measure(level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | None = None) -> Fit | None:
     """How well theta explains the picture. `start` [M, 2] are cells that the mean starts from."""
     index = cells_in_view(level, pattern, theta)
     if len(index) < _FEWEST:
@@ -73,11 +70,16 @@ def measure(
     weights = torch.ones(len(index)) if start is None else _members(index, start).float()
     if float(weights.sum()) < 3:
         return None
-    found = contrast(level, pattern, theta, index, weights=weights, grid=sample_grid(samples))
+    found = contrast(level, pattern, theta, index, weights=weights, grid=sample_grid())
+    return weighed(level, pattern, theta, index, found.contrast)
+
+
+def weighed(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, contrast: Tensor) -> Fit:
+    """The fit of theta whose cells `index` [N, 2] have this contrast [N], with their shares and its score."""
     area, _ = cell_areas(map_from_index(level, pattern, theta), index, level)
     share = (area / (level.size.width * level.size.height)).float()
-    score = float((share * (found.contrast - SUPPORT).clamp(min=0)).sum())
-    return Fit(theta, index, found.contrast, share, score)
+    score = float((share * (contrast - SUPPORT).clamp(min=0)).sum())
+    return Fit(theta, index, contrast, share, score)
 
 
 def grow(
@@ -89,7 +91,7 @@ def grow(
         return None
     theta, selected, weights = start
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
-    theta = refine(level, pattern, theta, index=selected, weights=weights, fixed=PHASE, samples=_SAMPLES)
+    theta = refine(level, pattern, theta, index=selected, weights=weights, fixed=PHASE)
     return follow(evidence, pattern, theta, selected, generator=generator, rounds=_ROUNDS)
 
 
@@ -157,10 +159,12 @@ def _local_seed(
     steps = torch.arange(-3, 4, dtype=torch.float64)
     index = torch.cartesian_prod(steps, steps)
     near = index.abs().amax(1) <= 1
-    grid = sample_grid(_SAMPLES)
+    grid = sample_grid()
     best: tuple[float, Tensor] | None = None
     for rx_deg, ry_deg in _tilts():
-        seen = tilted(proposal, rx_deg=rx_deg, ry_deg=ry_deg, focal_mm=evidence.focal_mm, level=level)
+        seen = tilted(
+            proposal, rx_deg=rx_deg, ry_deg=ry_deg, focal_mm=evidence.focal_mm, size=level.photo_size
+        )
         theta = seen.lattice.theta(pattern)
         cells = read_cells(level, pattern, theta, index, grid)
         mean, _ = mean_cell(cells, torch.ones(len(index)))
@@ -194,7 +198,7 @@ def _mean_energy(values: Tensor, known: Tensor) -> Tensor:
 
 def _neighbour_contrast(level: Level, pattern: Pattern, theta: Tensor, index: Tensor) -> Tensor:
     """Agreement of each cell with its four neighbours less that with its half steps, [N]: needs no mean."""
-    grid = sample_grid(_SAMPLES)
+    grid = sample_grid()
     cells = read_cells(level, pattern, theta, index, grid)
 
     def towards(step: Tensor) -> Tensor:
@@ -261,7 +265,7 @@ def _sample_of(count: int, generator: torch.Generator) -> Tensor:
 
 def side_of_cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:
     """The side of the cell at the origin, in photo pixels."""
-    return cell_px(evidence.level(COARSE, blur=0.5), pattern, theta)
+    return cell_px(evidence.frame, pattern, theta)
 
 
 def sane(pattern: Pattern, theta: Tensor) -> bool:

@@ -63,6 +63,13 @@ class Lattice:
         return torch.tensor([float(value[path]) for path in pattern.paths], dtype=torch.float64)
 
     @property
+    def plane_from_index(self) -> np.ndarray:
+        """The affine map from loop indices (i, j) to program units, [3, 3]."""
+        matrix = np.eye(3)
+        matrix[:2, :2], matrix[:2, 2] = self.basis.T, self.origin
+        return matrix
+
+    @property
     def cell_area(self) -> float:
         """The area of the fundamental cell, in square program units."""
         return abs(float(np.linalg.det(self.basis)))
@@ -146,10 +153,7 @@ def cells_in_view(
 def cell_areas(matrix: np.ndarray, index: Tensor, level: Level) -> tuple[Tensor, Tensor]:
     """The areas [N] in square map pixels of the cells at `index` under `matrix` (index -> map), and which
     of the cells lie wholly in the picture [N]."""
-    corners = (index[:, None, :] + _CORNERS[None]).numpy()
-    moved = np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=2) @ matrix.T
-    in_front = moved[..., 2] > 1e-9
-    points = moved[..., :2] / np.where(in_front, moved[..., 2], 1)[..., None]
+    points, in_front = cell_corners(matrix, index)
     limits = np.array([level.size.width - 1, level.size.height - 1])
     inside = (in_front & (points >= -0.5).all(2) & (points <= limits + 0.5).all(2)).all(1)
     a, b = points[:, 2] - points[:, 0], points[:, 3] - points[:, 1]
@@ -157,12 +161,18 @@ def cell_areas(matrix: np.ndarray, index: Tensor, level: Level) -> tuple[Tensor,
     return torch.from_numpy(area), torch.from_numpy(inside)
 
 
+def cell_corners(matrix: np.ndarray, index: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """The corners [N, 4, 2] of the cells at `index` [N, 2] under `matrix` (index -> pixels), in turn around
+    the cell, and which of them lie in front of the camera [N, 4]."""
+    corners = (index[:, None, :] + _CORNERS[None]).numpy()
+    moved = np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=2) @ matrix.T
+    in_front = moved[..., 2] > 1e-9
+    return moved[..., :2] / np.where(in_front, moved[..., 2], 1)[..., None], in_front
+
+
 def map_from_index(level: Level, pattern: Pattern, theta: Tensor) -> np.ndarray:
     """The homography from loop indices (i, j) to map pixels, [3, 3]."""
-    lattice = Lattice.of(pattern, theta)
-    plane_from_index = np.eye(3)
-    plane_from_index[:2, :2], plane_from_index[:2, 2] = lattice.basis.T, lattice.origin
-    return level.map_from_plane(pattern, theta).numpy() @ plane_from_index
+    return level.map_from_plane(pattern, theta).numpy() @ Lattice.of(pattern, theta).plane_from_index
 
 
 def cell_px(level: Level, pattern: Pattern, theta: Tensor) -> float:

@@ -1,7 +1,6 @@
 """Lattices on a photo: proposals, growth, the primitive cell, phase and extent, in this order."""
 
 import numpy as np
-from torch import Tensor
 
 from p3i.interp.pattern import Pattern
 from p3i.search.evidence import Evidence
@@ -152,11 +151,10 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     measured = layout_fit(session.evidence, pattern, layout)
     if measured is None:
         return None
-    count = len(measured.index)
     score = score_of(measured.contrast)
     if session.config.extent == "image":
         layout = filling_layout(session.evidence, pattern, layout)
-    session.record("answer", cells=count, score=score, worth=worth(measured))
+    session.record("answer", cells=len(measured.index), score=score, worth=worth(measured))
     program = layout.program(from_zero=not session.config.strict)
     return Answer(program, "lattice", score, worth(measured), notes)
 
@@ -172,38 +170,32 @@ def _explained(evidence: Evidence, pattern: Pattern, proposal: Proposal, fit: Fi
     """Whether a fit holds the proposal's lattice already, or one that it is part of."""
     if worth(fit) < _CERTAIN:
         return False  # another start may do better
-    level = evidence.level_for(100.0)
+    level = evidence.frame
     wide = proposal.lattice.theta(pattern)
+    ours, theirs = (map_from_index(level, pattern, theta) for theta in (fit.theta, wide))
     if not proposal.local:
         at = level.map_from_plane(pattern, fit.theta).numpy() @ [*Lattice.of(pattern, fit.theta).origin, 1.0]
     else:
         at = level.map_from_plane(pattern, wide).numpy() @ [*proposal.lattice.origin, 1.0]
-        cell = np.linalg.inv(_index_to_map(evidence, pattern, fit)) @ (at / at[2])
+        cell = np.linalg.inv(ours) @ (at / at[2])
         away = (fit.index[fit.support].numpy() - cell[:2] / cell[2]).astype(float)
         if len(away) == 0 or np.abs(away).max(1).min() > 1.0:
             return False
     point = at[:2] / at[2]
-    ours = _steps_at(_index_to_map(evidence, pattern, fit), point)
-    theirs = _steps_at(_matrix(evidence, pattern, wide), point)
-    return _whole_multiple(theirs, ours) or _whole_multiple(ours, theirs)
+    return _one_divides_the_other(ours, theirs, point)
 
 
 def _same(evidence: Evidence, pattern: Pattern, fit: Fit, other: Fit) -> bool:
     """Whether two fits mean one lattice, or one a multiple of the other."""
-    middle = np.array([*fit.index[fit.support].median(0).values.tolist(), 1.0])
-    at = _index_to_map(evidence, pattern, fit) @ middle
-    point = at[:2] / at[2]
-    a = _steps_at(_index_to_map(evidence, pattern, fit), point)
-    b = _steps_at(_index_to_map(evidence, pattern, other), point)
+    ours, theirs = (map_from_index(evidence.frame, pattern, one.theta) for one in (fit, other))
+    at = ours @ [*fit.index[fit.support].median(0).values.tolist(), 1.0]
+    return _one_divides_the_other(ours, theirs, at[:2] / at[2])
+
+
+def _one_divides_the_other(a: np.ndarray, b: np.ndarray, point: np.ndarray) -> bool:
+    """Whether, at a map point, one lattice (index -> map) is a part of the other, or the same."""
+    a, b = _steps_at(a, point), _steps_at(b, point)
     return _whole_multiple(a, b) or _whole_multiple(b, a)
-
-
-def _matrix(evidence: Evidence, pattern: Pattern, theta: Tensor) -> np.ndarray:
-    return map_from_index(evidence.level_for(100.0), pattern, theta)
-
-
-def _index_to_map(evidence: Evidence, pattern: Pattern, fit: Fit) -> np.ndarray:
-    return _matrix(evidence, pattern, fit.theta)
 
 
 def _steps_at(matrix: np.ndarray, point: np.ndarray) -> np.ndarray:

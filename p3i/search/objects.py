@@ -10,20 +10,20 @@ from torch import Tensor
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.pattern import Pattern
-from p3i.search.cells import contrast, sample_grid, sample_points
+from p3i.search.cells import sample_points
 from p3i.search.evidence import Evidence, Level
 from p3i.search.extent import find_extent
-from p3i.search.grow import SUPPORT, Fit, sane, side_of_cell
-from p3i.search.lattice import Lattice, cell_areas, cells_in_view, map_from_index
+from p3i.search.grow import Fit, sane, side_of_cell, weighed
+from p3i.search.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.phase import find_phase
 from p3i.search.register import find_instances, fit_instances
-from p3i.search.score import score_of
+from p3i.search.score import MOST_JUDGED, judged_contrast, judging_features, score_of
+from p3i.vision.warp import in_frame
 
 # Numbers in a program: angles to a thousandth of a degree, lengths to a ten-thousandth of a unit, which is
 # a hundredth of a pixel at the far end of a long row in a large photo.
 _ANGLE_DIGITS = 3
 _LENGTH_DIGITS = 4
-_SAMPLES = 6
 # The last fit: on a map sharper by this, on at most so many objects and at least so few, so many times.
 _SHARPER = 0.6
 _MOST_REFITTED = 300
@@ -112,8 +112,7 @@ def filling_layout(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layo
         *(torch.arange(int(a), int(b) + 1).double() for a, b in zip(first, last, strict=True))
     )
     points, in_front = sample_points(level, pattern, theta, around)
-    limits = torch.tensor([level.size.width - 0.5, level.size.height - 0.5])
-    seen = in_front & (points >= -0.5).all(1) & (points <= limits).all(1)
+    seen = in_front & in_frame(points, level.size)
     index = torch.cat([cells, around[seen]]).numpy().astype(int)
     low, high = index.min(0), index.max(0) + 1
     return Layout(layout.lattice, (int(low[0]), int(high[0])), (int(low[1]), int(high[1])))
@@ -143,25 +142,23 @@ def layout_fit(evidence: Evidence, pattern: Pattern, layout: Layout) -> Fit | No
     """
     theta = layout.lattice.theta(pattern)
     side = side_of_middle(evidence, pattern, layout)
-    features = evidence.config.features
-    names = [features] if "rgb" in features.split("+") else [features, features + "+rgb"]
-    fits = [_measured(evidence.level_for(side, name=name), pattern, layout, theta) for name in names]
+    levels = (evidence.level_for(side, name=name) for name in judging_features(evidence.config))
+    fits = [_measured(level, pattern, layout, theta) for level in levels]
     return max((fit for fit in fits if fit is not None), key=lambda fit: score_of(fit.contrast), default=None)
 
 
 def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> Fit | None:
-    index = cells_in_view(level, pattern, theta, most=4000)
-    index = index[torch.from_numpy(layout.holds(index.numpy()))]
+    index = _drawn_cells(level, pattern, layout, theta)
     if len(index) < 4:
         return None
-    index = index[:: len(index) // 600 + 1]
-    found = contrast(
-        level, pattern, theta, index, weights=torch.ones(len(index)), grid=sample_grid(_SAMPLES), rounds=4
-    )
-    area, _ = cell_areas(map_from_index(level, pattern, theta), index, level)
-    share = (area / (level.size.width * level.size.height)).float()
-    score = float((share * (found.contrast - SUPPORT).clamp(min=0)).sum())
-    return Fit(theta, index, found.contrast, share, score)
+    index = index[:: len(index) // MOST_JUDGED + 1]
+    return weighed(level, pattern, theta, index, judged_contrast(level, pattern, theta, index))
+
+
+def _drawn_cells(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> Tensor:
+    """The cells in view that a layout draws, [N, 2]."""
+    index = cells_in_view(level, pattern, theta, most=4000)
+    return index[torch.from_numpy(layout.holds(index.numpy()))]
 
 
 def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
@@ -172,8 +169,7 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     theta = layout.lattice.theta(pattern)
     side = side_of_middle(evidence, pattern, layout)
     level = evidence.level_for(_SHARPER * side, finest=True)
-    index = cells_in_view(level, pattern, theta, most=4000)
-    index = index[torch.from_numpy(layout.holds(index.numpy()))]
+    index = _drawn_cells(level, pattern, layout, theta)
     if len(index) < _FEWEST_REFITTED:
         return layout
     index = index[:: len(index) // _MOST_REFITTED + 1]
@@ -199,11 +195,7 @@ def _painted(evidence: Evidence, cells: Tensor, matrix: np.ndarray, lattice: Lat
     """Where the cells [N, 2] lie in the photo: bool [H, W]."""
     size = evidence.image.size
     canvas = np.zeros((size.height, size.width), np.uint8)
-    corners = torch.tensor([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], dtype=torch.float64)
-    index = cells[:, None, :] + corners[None]
-    plane = index.numpy() @ lattice.basis + lattice.origin
-    moved = np.concatenate([plane, np.ones((*plane.shape[:2], 1))], 2) @ matrix.T
-    points = moved[..., :2] / moved[..., 2:]
+    points, _ = cell_corners(matrix @ lattice.plane_from_index, cells)
     for polygon in np.round(points).astype(np.int32):
         cv2.fillConvexPoly(canvas, polygon, 1)
     return canvas.astype(bool)

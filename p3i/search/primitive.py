@@ -47,7 +47,6 @@ _ALIKE = 0.3
 _LEAST_AGREEMENT = 0.2
 # A finer lattice must keep this share of the contrast against half steps (DESIGN.md, 4.5).
 _NEARLY_AS_GOOD = 0.5
-_SAMPLES = 6
 # This many cells are enough to tell one lattice from another.
 _MOST_CELLS = 100
 _FEWEST = 4
@@ -150,9 +149,7 @@ def _likeness(
     for name in (None, "rgb"):
         level = evidence.level_for(side, name=name)
         groups = [
-            read_cells(
-                level, pattern, ground.theta, ground.index[coset == kind][::every], sample_grid(_SAMPLES)
-            )
+            read_cells(level, pattern, ground.theta, ground.index[coset == kind][::every], sample_grid())
             for kind in kinds
         ]
         ones = [torch.ones(len(group.values)) for group in groups]
@@ -185,5 +182,5 @@ def _contrast(evidence: Evidence, pattern: Pattern, ground: _Ground) -> float:
     some = ground.index[:: max(1, len(ground.index) // _MOST_CELLS)]
     level = evidence.level_for(side_of_cell(evidence, pattern, ground.theta))
     weights = torch.ones(len(some))
-    found = contrast(level, pattern, ground.theta, some, weights=weights, grid=sample_grid(_SAMPLES))
+    found = contrast(level, pattern, ground.theta, some, weights=weights, grid=sample_grid())
     return float(found.contrast.clamp(min=0).mean())

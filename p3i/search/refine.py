@@ -52,7 +52,7 @@ def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = fro
             # A constant may move as far as the loops' own steps.
             alike = ("i", "j") if variable == "1" else (variable,)
             steps = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] in alike]
-            limit = _MOST_CHANGE * max(*steps, 1e-3, 0.0)
+            limit = _MOST_CHANGE * max(*steps, 1e-3)
         places.append(place)
         limits.append(limit)
     return FreeNumbers(tuple(places), tuple(limits))
@@ -66,7 +66,6 @@ def refine(
     index: Tensor,
     weights: Tensor,
     fixed: frozenset[str],
-    samples: int = 6,
     iterations: int = 4,
 ) -> Tensor:
     """Move theta [P] so that the cells around `index` [N, 2] look alike; returns the new theta.
@@ -74,7 +73,7 @@ def refine(
     `weights` [N] say how much each cell counts. `fixed` names the numbers that stay: those that shift all
     cells alike (the phase) must, since looking alike does not fix them.
     """
-    grid = sample_grid(samples)
+    grid = sample_grid()
     at = (index[:, None, :] + grid[None]).reshape(-1, 2)
     free = free_numbers(pattern, theta, fixed=fixed)
     places, limits = torch.tensor(free.places), torch.tensor(free.limits, dtype=torch.float64)

@@ -15,10 +15,10 @@ from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence, Level
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
-from p3i.vision.warp import sample, sample_valid
+from p3i.vision.warp import in_frame, sample, sample_valid
 
-_SAMPLES = 6
-_MOST_CELLS = 600
+MOST_JUDGED = 600
+"""More cells than this are not needed to judge a program."""
 _ROUNDS = 4
 # What so many cells explain, chance explains too.
 _FEW = 6
@@ -52,8 +52,7 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
     evidence = Evidence(image, config, focal_mm)
     pattern = _without_doubles(compile(program))
     points, in_front = pattern.centers_px(size=image.size, focal_mm=focal_mm)
-    limits = torch.tensor([image.size.width - 0.5, image.size.height - 0.5])
-    seen = in_front & (points >= -0.5).all(1) & (points <= limits).all(1)
+    seen = in_front & in_frame(points, image.size)
     if int(seen.sum()) < 2:
         raise ProgramError(f"{int(seen.sum())} of the program's objects lie in the photo; a score needs two")
     loss, pairs = _equation2(evidence, pattern, points, seen)
@@ -63,24 +62,36 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
 def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -> float:
     """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`."""
     index = pattern.index[seen].double()
-    index = index[:: len(index) // _MOST_CELLS + 1]
-    features = evidence.config.features
-    names = [features] if "rgb" in features.split("+") else [features, features + "+rgb"]
+    index = index[:: len(index) // MOST_JUDGED + 1]
     side = _cell_px(evidence, pattern, index)
-    scores = []
-    for name in names:
-        found = contrast(
-            evidence.level_for(side, name=name),
-            pattern,
-            pattern.theta,
-            index,
-            weights=torch.ones(len(index)),
-            grid=sample_grid(_SAMPLES),
-            half_steps=_half_steps(pattern),
-            rounds=_ROUNDS,
-        )
-        scores.append(score_of(found.contrast))
-    return max(scores)
+    half_steps = _half_steps(pattern)
+    return max(
+        score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=half_steps))
+        for level in (evidence.level_for(side, name=name) for name in judging_features(evidence.config))
+    )
+
+
+def judging_features(config: SearchConfig) -> tuple[str, ...]:
+    """The features that programs are judged by, each alone: the search's, and these with the colours."""
+    names = config.features
+    return (names,) if "rgb" in names.split("+") else (names, names + "+rgb")
+
+
+def judged_contrast(
+    level: Level,
+    pattern: Pattern,
+    theta: torch.Tensor,
+    index: torch.Tensor,
+    *,
+    half_steps: torch.Tensor = HALF_STEPS,
+) -> torch.Tensor:
+    """The contrast [N] of the cells `index` [N, 2] of a program that is judged: all count alike at first."""
+    weights = torch.ones(len(index))
+    grid = sample_grid()
+    found = contrast(
+        level, pattern, theta, index, weights=weights, grid=grid, half_steps=half_steps, rounds=_ROUNDS
+    )
+    return found.contrast
 
 
 def score_of(contrast: torch.Tensor) -> float:
@@ -139,7 +150,7 @@ def _half_steps(pattern: Pattern) -> torch.Tensor:
 
 def _cell_px(evidence: Evidence, pattern: Pattern, index: torch.Tensor) -> float:
     """A typical distance of neighbours, in photo pixels: the size of what is compared."""
-    level: Level = evidence.level_for(100.0)
+    level = evidence.frame
     matrix = level.map_from_plane(pattern, pattern.theta)
     here, front = project(matrix, pattern.points_at(index))
     steps = []

@@ -13,6 +13,7 @@ from p3i.search.session import Answer, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
+from p3i.vision.warp import in_frame
 
 # Pictures below this many pixels a side, or with less than this share known, are not searched.
 _LEAST_SIDE = 32
@@ -99,12 +100,7 @@ def centers_px(program: Program, image: Image, focal_mm: float) -> tuple[tuple[f
     camera = Camera.of(program, focal_mm=focal_mm)
     plane = torch.tensor([point[:2] for point in points], dtype=torch.float64)
     pixels, in_front = project(camera.image_from_plane(image.size), plane)
-    inside = (
-        in_front
-        & (pixels >= -0.5).all(1)
-        & (pixels[:, 0] <= image.size.width - 0.5)
-        & (pixels[:, 1] <= image.size.height - 0.5)
-    )
+    inside = in_front & in_frame(pixels, image.size)
     return tuple(
         (float(pixels[place, 0]), float(pixels[place, 1]), *points[place][2:])
         for place in unroll.distinct(points)

@@ -42,6 +42,12 @@ def sample_valid(valid: Tensor, points_px: Tensor) -> Tensor:
     return inside & (known >= _WHOLE)
 
 
+def in_frame(points_px: Tensor, size: Size) -> Tensor:
+    """Which points [..., 2] lie on a picture's pixels, the outer halves of the outermost included: [...]."""
+    limits = torch.tensor([size.width - 0.5, size.height - 0.5], dtype=points_px.dtype)
+    return ((points_px >= -0.5) & (points_px <= limits)).all(-1)
+
+
 def warp(values: Tensor, source_from_target: Tensor, size: Size) -> Tensor:
     """See a map through a homography, differentiable in both.
 

@@ -83,7 +83,9 @@ def test_a_tilted_proposal_keeps_its_place_and_its_steps_in_the_photo() -> None:
     level = evidence_of(small_scene(14)).level(448, blur=0.5)
     flat = Lattice(0.0, 0.0, np.array([[7.0, 1.0], [-2.0, 9.0]]), np.array([12.0, -9.0]))
     for rx, ry in ((30.0, 0.0), (-20.0, 35.0), (0.0, -50.0)):
-        found = tilted(Proposal(flat, 0.7, local=True), rx_deg=rx, ry_deg=ry, focal_mm=35.0, level=level)
+        found = tilted(
+            Proposal(flat, 0.7, local=True), rx_deg=rx, ry_deg=ry, focal_mm=35.0, size=level.photo_size
+        )
         assert (found.worth, found.local) == (0.7, True)
         assert (found.lattice.rx_deg, found.lattice.ry_deg) == (rx, ry)
         at = origin_px(flat)

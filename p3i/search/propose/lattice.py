@@ -14,8 +14,9 @@ import numpy as np
 
 from p3i.interp.camera import Camera, image_from_plane
 from p3i.search.autocorrelation import autocorrelation, best_pair
-from p3i.search.evidence import COARSE, FINE, Evidence, Level
+from p3i.search.evidence import FINE, Evidence, Level
 from p3i.search.lattice import Lattice, reduce_basis
+from p3i.size import Size
 
 # The canvas of a straightened view, in pixels a side.
 _CANVAS = 128
@@ -42,7 +43,7 @@ class Proposal:
 
 def straightened_proposals(evidence: Evidence) -> list[Proposal]:
     """One proposal for each pose of the grid that shows a lattice, the most promising first."""
-    level = evidence.level(COARSE, blur=0.5)
+    level = evidence.frame
     view_of = _Views(level, evidence.focal_mm)
     found = []
     for rx_deg, ry_deg in pose_grid():
@@ -166,9 +167,8 @@ class _Views:
         return features, weights.astype(np.float32), unit, (low + high) / 2
 
 
-def tilted(proposal: Proposal, *, rx_deg: float, ry_deg: float, focal_mm: float, level: Level) -> Proposal:
+def tilted(proposal: Proposal, *, rx_deg: float, ry_deg: float, focal_mm: float, size: Size) -> Proposal:
     """The same local lattice, read under another pose: same place and steps in the photo near its origin."""
-    size = level.photo_size
 
     def homography(rx: float, ry: float) -> np.ndarray:
         return image_from_plane(rx, ry, size=size, focal_mm=focal_mm).numpy()
