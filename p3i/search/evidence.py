@@ -12,7 +12,9 @@ from p3i.interp.pattern import Pattern
 from p3i.search.config import SearchConfig
 from p3i.size import Size
 from p3i.vision.features import FeatureMap, extract
-from p3i.vision.image import Image
+from p3i.vision.fill import filled
+from p3i.vision.image import Image, resized
+from p3i.vision.lab import lab_of
 
 COARSE = 320
 """Longer side, in pixels, of the map on which patterns with large cells are found."""
@@ -22,6 +24,8 @@ FINE = 640
 # A cell is compared through a blur of this share of its side: wider than what its samples lie apart, so that
 # gradients of the samples say where the next sample goes, narrow enough to keep the cell's own drawing.
 _BLUR_SHARE = 0.1
+# Colours are not reduced below this many pixels on the longer side.
+_SMALLEST_MAP = 96
 # Cells narrower than this on the coarse map are looked at on the fine one.
 _LEAST_COARSE_CELL = 24.0
 
@@ -66,6 +70,15 @@ class Level:
         return self.map_from_photo @ seen
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ColourMap:
+    """A photo's colours, reduced: `values` float32 [3, H, W] Lab, `valid` [H, W], `map_from_photo` [3, 3]."""
+
+    values: Tensor
+    valid: Tensor
+    map_from_photo: Tensor
+
+
 @dataclass(slots=True)
 class Evidence:
     """A photo as the search sees it. Holds the maps that were made so far, nothing else changes."""
@@ -75,6 +88,7 @@ class Evidence:
     focal_mm: float
     _maps: dict[tuple[str, int], FeatureMap] = field(default_factory=dict)
     _levels: dict[tuple[str, int, float], Level] = field(default_factory=dict)
+    _colours: dict[int, ColourMap] = field(default_factory=dict)
 
     def features(self, longer: int, *, name: str | None = None) -> FeatureMap:
         """The photo's features with the longer side reduced to `longer` pixels (never enlarged).
@@ -94,6 +108,20 @@ class Evidence:
         if key not in self._levels:
             self._levels[key] = _level(self, self.features(longer, name=name), 2.0**step)
         return self._levels[key]
+
+    def colours_for(self, step_px: float) -> ColourMap:
+        """The photo's colours on a map where samples `step_px` photo pixels apart are about a pixel apart."""
+        halvings = min(5, max(0, round(math.log2(max(step_px, 1.0)) + 0.2)))
+        while halvings and self.image.size.longer / 2**halvings < _SMALLEST_MAP:
+            halvings -= 1
+        if halvings not in self._colours:
+            small = resized(self.image, math.ceil(self.image.size.longer / 2**halvings))
+            lab = cv2.GaussianBlur(lab_of(filled(small.pixels, small.valid)), (0, 0), 0.7)
+            shift, scale = 0.5 / small.stride - 0.5, 1 / small.stride
+            matrix = torch.tensor([[scale, 0, shift], [0, scale, shift], [0, 0, 1.0]], dtype=torch.float64)
+            values = torch.from_numpy(lab).permute(2, 0, 1).contiguous()
+            self._colours[halvings] = ColourMap(values, torch.from_numpy(small.valid), matrix)
+        return self._colours[halvings]
 
     @property
     def frame(self) -> Level:

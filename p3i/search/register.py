@@ -5,6 +5,7 @@ a third of a cell, tells a cell that is there from one that is not, and leaves a
 problem in the program's numbers, which the compiled generator solves for any sketch.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -59,29 +60,40 @@ def find_instances(
     cells = read_cells(level, pattern, theta, index, torch.cartesian_prod(steps, steps))
     planes = cells.values.reshape(len(index), wide, wide, -1).permute(0, 3, 1, 2)  # [N, C, a, b]
     known = cells.known.reshape(len(index), 1, wide, wide).float()
-    middle = slice(_REACH, _REACH + _SIDE)
+    offsets, peak, lead = correlate(planes, known, weights, side=_SIDE, reach=_REACH)
+    return Instances(index, offsets / _SIDE, peak, lead)
+
+
+def correlate(
+    planes: Tensor, known: Tensor, weights: Tensor, *, side: int, reach: int
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Where in each plane its middle, as the other planes have it, fits best.
+
+    Shapes: planes [N, C, w, w] with w = side + 2 * reach, known [N, 1, w, w] 0 or 1, weights [N] ->
+    offsets [N, 2] in samples (row, column), the agreement there [N], and its lead over the rim [N].
+    """
+    count, channels, wide, _ = planes.shape
+    middle = slice(reach, reach + side)
     own = planes[:, :, middle, middle]
     own_known = known[:, :, middle, middle]
     weight = own_known * weights.float()[:, None, None, None]
     total = weight.sum(0, keepdim=True)
     mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
-    shape = (1, len(index) * planes.shape[1], wide, wide)
     # Grouped correlation: each cell with the mean of the others.
     rest = (total - weight).clamp(min=1e-6)
     others = (mean * total - weight * own) / rest
     others = torch.where(total - weight > 1e-3, others, mean)
-    kernel = others.reshape(-1, 1, _SIDE, _SIDE)
-    inner = F.conv2d(planes.reshape(shape), kernel, groups=kernel.shape[0])
-    inner = inner.reshape(len(index), planes.shape[1], *inner.shape[-2:]).sum(1)
-    energy = F.conv2d(planes.square().sum(1, keepdim=True), torch.ones(1, 1, _SIDE, _SIDE))[:, 0]
+    kernel = others.reshape(-1, 1, side, side)
+    inner = F.conv2d(planes.reshape(1, count * channels, wide, wide), kernel, groups=kernel.shape[0])
+    inner = inner.reshape(count, channels, *inner.shape[-2:]).sum(1)
+    energy = F.conv2d(planes.square().sum(1, keepdim=True), torch.ones(1, 1, side, side))[:, 0]
     squared = others.square().sum(1)
-    of_mean = F.conv2d(known.reshape(1, len(index), wide, wide), squared[:, None], groups=len(index))[0]
-    value = 2 * inner / (energy + of_mean).clamp(min=1e-6)
-    return _peaks(index, value)
+    of_mean = F.conv2d(known.reshape(1, count, wide, wide), squared[:, None], groups=count)[0]
+    return _peaks(2 * inner / (energy + of_mean).clamp(min=1e-6))
 
 
-def _peaks(index: Tensor, value: Tensor) -> Instances:
-    """The best place of each cell in its table of agreements [N, S, S], finer than the samples."""
+def _peaks(value: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The best place in each table of agreements [N, S, S], finer than the samples: see `correlate`."""
     count, side, _ = value.shape
     flat = value.reshape(count, -1)
     peak, place = flat.max(1)
@@ -101,7 +113,7 @@ def _peaks(index: Tensor, value: Tensor) -> Instances:
     rim = torch.ones(side, side, dtype=torch.bool)
     rim[1:-1, 1:-1] = False
     lead = torch.where(inside, peak - value[:, rim].amax(1), 0.0)
-    return Instances(index, offsets / _SIDE, peak, lead)
+    return offsets, peak, lead
 
 
 def fit_instances(
@@ -124,27 +136,66 @@ def fit_instances(
     inverse, cell = _index_from_map(level, pattern, theta, found.index)
     noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()
 
-    def points_of(moving: Tensor, base: Tensor) -> tuple[Tensor, Tensor]:
-        points, _ = sample_points(level, pattern, base.index_put((places,), moving), found.index)
+    def points_of(moving: Tensor) -> Tensor:
+        return sample_points(level, pattern, theta.index_put((places,), moving), found.index)[0]
+
+    moved = robust_fit(
+        points_of,
+        theta[places],
+        targets=targets,
+        whiten=inverse / noise[:, None, None],
+        weights=weights,
+        limits=limits,
+        iterations=iterations,
+    )
+    return theta.index_put((places,), moved)
+
+
+def robust_fit(
+    points_of: Callable[[Tensor], Tensor],
+    start: Tensor,
+    *,
+    targets: Tensor,
+    whiten: Tensor,
+    weights: Tensor,
+    limits: Tensor,
+    prior: Tensor | None = None,
+    iterations: int = 6,
+) -> Tensor:
+    """Move numbers so that points fall on their targets: Gauss-Newton, with strays counting less.
+
+    `points_of` takes numbers [V] to points [N, 2] (torch.func goes through it), `start` [V] is where to
+    begin, `targets` [N, 2], `whiten` [N, 2, 2] takes a difference of points to one in units of its noise,
+    `weights` [N], `limits` [V] is the most that a step may move each number. `prior` [V, 2], if given, holds
+    a mean and a weight (1 / variance) for each number.
+    """
+
+    def points_twice(moving: Tensor) -> tuple[Tensor, Tensor]:
+        points = points_of(moving)
         return points, points.detach()
 
+    moving = start
     for _ in range(iterations):
-        jacobian, points = torch.func.jacfwd(points_of, has_aux=True)(theta[places], theta)
-        residual = torch.einsum("nij,nj->ni", inverse, points - targets) / noise[:, None]
-        rows = torch.einsum("nij,njp->nip", inverse, jacobian * limits) / noise[:, None, None]
+        jacobian, points = torch.func.jacfwd(points_twice, has_aux=True)(moving)
+        residual = torch.einsum("nij,nj->ni", whiten, points - targets)
+        rows = torch.einsum("nij,njp->nip", whiten, jacobian * limits)
         distance = residual.square().sum(1)
         weight = (weights / (1 + distance / _ROBUST_SCALE**2)).sqrt()
-        a = (rows * weight[:, None, None]).reshape(-1, len(places))
+        a = (rows * weight[:, None, None]).reshape(-1, len(start))
         b = (residual * weight[:, None]).reshape(-1)
-        normal = a.T @ a
-        step = -torch.linalg.solve(normal + 1e-6 * torch.diag(normal.diagonal() + 1e-9), a.T @ b)
+        normal, slope = a.T @ a, a.T @ b
+        if prior is not None:
+            mean, certainty = prior[:, 0], prior[:, 1]
+            normal = normal + torch.diag(certainty * limits**2)
+            slope = slope + certainty * (moving - mean) * limits
+        step = -torch.linalg.solve(normal + 1e-6 * torch.diag(normal.diagonal() + 1e-9), slope)
         if not bool(torch.isfinite(step).all()):
             break
         worst = float(step.abs().max())
-        theta = theta.index_put((places,), theta[places] + step * limits / max(1.0, worst))
+        moving = moving + step * limits / max(1.0, worst)
         if worst < 1e-3:
             break
-    return theta
+    return moving
 
 
 def _index_from_map(level: Level, pattern: Pattern, theta: Tensor, index: Tensor) -> tuple[Tensor, Tensor]:

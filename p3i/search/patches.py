@@ -1,0 +1,236 @@
+"""Object patches: the plane around each draw of any program, read off the photo and compared.
+
+Cells (cells.py) are swept by fractional loop indices, which suits lattices. Rings, spirals and single rows
+have no second direction to sweep, and their objects turn as they go round. A patch is a square of plane of
+one size for the whole program, about each draw, turned with the curve where the program draws on a curve. As
+there, a pattern is where objects predict each other and do not predict what lies half a step away.
+
+Convention: N patches of `side` x `side` samples, C channels; `index` float64 [N, 2] loop indices, fractions
+allowed; plane coordinates in program units. Patch offsets (a, b) are in patch sides: a along the curve, b
+across it (a quarter turn clockwise on the screen).
+"""
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from p3i.grammar.ast import Polar
+from p3i.interp.camera import project
+from p3i.interp.pattern import Pattern
+from p3i.interp.unroll import nest
+from p3i.search.cells import HALF_STEPS, Cells, Contrast, agreement, agreement_with_others, mean_cell
+from p3i.search.evidence import ColourMap, Evidence
+from p3i.search.register import Instances, correlate
+from p3i.vision.warp import sample, sample_valid
+
+SIDE = 14
+"""Samples along a patch's side."""
+REACH = 5
+"""Samples to each side by which an object is searched for around its patch: about a third of a side."""
+# Loop indices this far apart give the direction of the curve.
+_TANGENT_STEP = 0.02
+# More draws than this are not needed to say how far apart draws are.
+_MOST_MEASURED = 400
+# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
+_FLOOR = 0.4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frames:
+    """Where patches lie on the plane: `origin` [N, 2], `along` and `across` [N, 2], one patch side long."""
+
+    origin: Tensor
+    along: Tensor
+    across: Tensor
+
+    def points(self, offsets: Tensor) -> Tensor:
+        """The plane points at `offsets` [..., N or 1, K, 2] -> [..., N, K, 2]."""
+        a, b = offsets[..., 0, None], offsets[..., 1, None]
+        return self.origin[:, None] + a * self.along[:, None] + b * self.across[:, None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patches:
+    """Features [N, C, side, side] of patches and which samples are `known` [N, side, side]."""
+
+    values: Tensor
+    known: Tensor
+
+    def cells(self) -> Cells:
+        """The same as rows of samples: values [N, K, C], known [N, K]."""
+        return Cells(self.values.flatten(2).mT, self.known.flatten(1))
+
+
+def spacing(pattern: Pattern, theta: Tensor) -> float:
+    """The median distance of a draw to its nearest neighbour, in program units; 1 for a single draw.
+
+    Draws that coincide count once.
+    """
+    centers = pattern.centers(theta)
+    centers = centers[:: len(centers) // _MOST_MEASURED + 1] if len(centers) > 2000 else centers
+    few = centers[:: len(centers) // _MOST_MEASURED + 1]
+    distance = torch.cdist(few, centers)
+    distance = torch.where(distance > 1e-6, distance, torch.inf).amin(1)
+    finite = distance[torch.isfinite(distance)]
+    return float(finite.median()) if len(finite) else 1.0
+
+
+def turning(pattern: Pattern) -> int | None:
+    """The loop variable that goes round a curve, 0 for i and 1 for j; None where draws stand in rows."""
+    draw = nest(pattern.program).draw
+    for form in (draw.x, draw.y):
+        if isinstance(form, Polar):
+            return 1 if form.angle.j != 0 else 0
+    return None
+
+
+def frames(pattern: Pattern, theta: Tensor, index: Tensor, *, side: float) -> Frames:
+    """The patches of `side` program units about `index` [N, 2]."""
+    origin = pattern.points_at(index, theta)
+    variable = turning(pattern)
+    if variable is None:
+        along = torch.tensor([side, 0.0], dtype=torch.float64).expand_as(origin)
+    else:
+        step = torch.zeros(2, dtype=torch.float64)
+        step[variable] = _TANGENT_STEP
+        tangent = pattern.points_at(index + step, theta) - pattern.points_at(index - step, theta)
+        along = side * tangent / tangent.norm(dim=1, keepdim=True).clamp(min=1e-12)
+    across = torch.stack([-along[:, 1], along[:, 0]], 1)
+    return Frames(origin, along, across)
+
+
+def half_steps(pattern: Pattern) -> Tensor:
+    """The half steps [M, 2] of the loop variables that move the draws: one where only one does."""
+    theta = dict(zip(pattern.paths, pattern.theta.tolist(), strict=True))
+    moving = [
+        any(
+            path.startswith("draw.") and path.endswith(f".{variable}") and value != 0
+            for path, value in theta.items()
+        )
+        for variable in ("i", "j")
+    ]
+    if all(moving):
+        return HALF_STEPS
+    return HALF_STEPS[:1] if moving[0] else HALF_STEPS[1:2]
+
+
+def offsets_grid(count: int, *, samples_a_side: int = SIDE) -> Tensor:
+    """`count` x `count` offsets about the middle of a patch that has `samples_a_side`: [count, count, 2]."""
+    steps = (torch.arange(count, dtype=torch.float64) - (count - 1) / 2) / samples_a_side
+    b, a = torch.meshgrid(steps, steps, indexing="ij")
+    return torch.stack([a, b], -1)
+
+
+def sample_px(matrix: Tensor, where: Frames, *, side: int = SIDE) -> float:
+    """The median distance of a patch's samples in photo pixels; `matrix` takes program units to pixels."""
+    lengths = []
+    middle, front = project(matrix, where.origin)
+    for axis in (where.along, where.across):
+        there, ahead = project(matrix, where.origin + 0.25 * axis)
+        lengths.append((there - middle).norm(dim=1)[front & ahead] * 4 / side)
+    typical = torch.cat(lengths)
+    return float(typical.median()) if len(typical) else 1.0
+
+
+def read(
+    colours: ColourMap, matrix: Tensor, where: Frames, *, count: int = SIDE, side: int = SIDE
+) -> Patches:
+    """The features of `count` x `count` samples about each frame, `side` of them to a patch side.
+
+    `matrix` [3, 3] takes program units to photo pixels. Twelve channels: for each of L, a, b the gradient's
+    strength and its double angle (as in vision/oriented.py, but in the frame's own directions, so that
+    objects that turn with a ring stay equal), then L, a, b themselves. Each patch is freed of its mean, and
+    gradients and colours are each scaled to mean energy 1/2 over all patches.
+    """
+    rim = count + 2
+    at, in_front = project(
+        colours.map_from_photo @ matrix,
+        where.points(offsets_grid(rim, samples_a_side=side).reshape(-1, 2)).reshape(-1, 2),
+    )
+    at = at.float()
+    lab = sample(colours.values, at).reshape(-1, rim, rim, 3).permute(0, 3, 1, 2)
+    known = (sample_valid(colours.valid, at) & in_front).reshape(-1, rim, rim)
+    # A gradient is known where the samples about it are.
+    whole = F.max_pool2d((~known).float()[:, None], 3, stride=1)[:, 0] < 0.5
+    return Patches(_features(lab, whole), whole)
+
+
+def _features(lab: Tensor, known: Tensor) -> Tensor:
+    """[N, 3, s + 2, s + 2] colours -> [N, 12, s, s] normalised features, 0 where not known [N, s, s]."""
+    gx = 0.5 * (lab[:, :, 1:-1, 2:] - lab[:, :, 1:-1, :-2])
+    gy = 0.5 * (lab[:, :, 2:, 1:-1] - lab[:, :, :-2, 1:-1])
+    squared = gx.square() + gy.square()
+    root = squared.sqrt().sqrt()
+    factor = root / (squared + _FLOOR**2)
+    gradient = torch.cat([root, (gx.square() - gy.square()) * factor, 2 * gx * gy * factor], 1)
+    return torch.cat([_normalised(gradient, known), _normalised(lab[:, :, 1:-1, 1:-1], known)], 1)
+
+
+def _normalised(values: Tensor, known: Tensor) -> Tensor:
+    """Each patch freed of its mean and divided by sqrt(its energy + the mean energy of all)."""
+    mask = known[:, None].float()
+    count = mask.sum((2, 3), keepdim=True).clamp(min=1)
+    values = (values - (values * mask).sum((2, 3), keepdim=True) / count) * mask
+    energy = values.square().sum((1, 2, 3), keepdim=True) / count
+    typical = energy[energy > 0].median() if bool((energy > 0).any()) else energy.sum() + 1.0
+    return values / (energy + typical).clamp(min=1e-9).sqrt()
+
+
+def patch_contrast(
+    evidence: Evidence,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    *,
+    side: float,
+    focal_mm: Tensor | float,
+    rounds: int = 3,
+) -> Contrast:
+    """How well each patch at `index` [N, 2] is predicted by the others, beyond half a step away: [N] each."""
+    steps = half_steps(pattern)
+    every = torch.cat([torch.zeros(1, 2, dtype=torch.float64), steps, -steps])
+    where = frames(pattern, theta, (index[None] + every[:, None]).reshape(-1, 2), side=side)
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where).cells()
+    values = cells.values.reshape(len(every), len(index), *cells.values.shape[1:])
+    known = cells.known.reshape(len(every), len(index), -1)
+    whole = Cells(values[0], known[0])
+    weights = torch.ones(len(index))
+    found = Contrast(torch.zeros(len(index)), torch.zeros(len(index)))
+    for _ in range(rounds):
+        mean, _ = mean_cell(whole, weights)
+        others = agreement_with_others(whole, weights)
+        at_half = agreement(values[1:], mean, known[1:]).reshape(2, len(steps), -1)
+        found = Contrast(others, others - at_half.mean(0).amax(0).clamp(min=0))
+        weights = found.contrast.clamp(min=0)
+        if float(weights.sum()) <= 0:
+            break
+    return found
+
+
+def find_objects(
+    evidence: Evidence,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    weights: Tensor,
+    *,
+    side: float,
+    reach: int = REACH,
+    focal_mm: Tensor | float,
+) -> Instances:
+    """Search around each patch of `index` [N, 2] for the mean patch; `weights` [N] make that mean.
+
+    The offsets that come back are in patch sides, along and across.
+    """
+    where = frames(pattern, theta, index, side=side)
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    colours = evidence.colours_for(sample_px(matrix, where))
+    patches = read(colours, matrix, where, count=SIDE + 2 * reach)
+    offsets, peak, lead = correlate(
+        patches.values, patches.known.float()[:, None], weights, side=SIDE, reach=reach
+    )
+    # Rows of a patch run across the curve, columns along it.
+    return Instances(index, offsets.flip(1) / SIDE, peak, lead)
