@@ -96,7 +96,7 @@ def _blurred(scene: Scene, sigma: float, random: Random) -> np.ndarray:
 
 def _compressed(scene: Scene, quality: float, random: Random) -> np.ndarray:
     _, file = cv2.imencode(".jpg", scene.pixels, [cv2.IMWRITE_JPEG_QUALITY, int(quality)])
-    return cv2.imdecode(file, cv2.IMREAD_COLOR).astype(np.float32) / 255
+    return np.asarray(cv2.imdecode(file, cv2.IMREAD_COLOR), np.float32) / 255
 
 
 def _noisy(scene: Scene, spread: float, random: Random) -> np.ndarray:
@@ -132,7 +132,7 @@ def _covered(scene: Scene, share: float, random: Random) -> np.ndarray:
             [np.cos(turns), random.uniform(0.6, 1.6) * np.sin(turns)], 1
         )
         blob = cv2.fillPoly(np.zeros_like(hidden), [np.round(outline).astype(np.int32)], 1).astype(bool)
-        ground = texture(random, *hidden.shape)
+        ground = texture(random, hidden.shape[0], hidden.shape[1])
         pixels[blob] = ground[blob]
         hidden[blob] = 1
     return pixels
@@ -166,7 +166,7 @@ def _small(share: float) -> Spoilt:
 
 
 def _periodic(period: float) -> Spoilt:
-    """Objects `period` pixels apart in the middle of the frame, which they fill if that takes at most 24^2."""
+    """Objects `period` pixels apart in the middle; they fill the frame where 24 x 24 are enough."""
 
     def spoilt(seed: int) -> Scene:
         random = np.random.default_rng(30_000 + seed)
@@ -263,7 +263,7 @@ def _bytes(pixels: np.ndarray) -> np.ndarray:
 
 
 def same_lattice(scene: Scene, result: SynthesisResult) -> bool:
-    """Whether the found steps are the true ones, up to the choice of a basis, where the objects were found."""
+    """Whether the found steps are the true ones, up to the choice of a basis, where objects were found."""
     centers = np.array(result.centers).reshape(-1, 4)
     if len(centers) < 4:
         return False
