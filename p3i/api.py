@@ -15,7 +15,7 @@ from p3i.grammar.ast import Header, Program
 from p3i.language import check, dump, dumps, expand, format, load, loads
 from p3i.paint.options import RenderOptions
 from p3i.search.config import SearchConfig
-from p3i.search.result import SynthesisResult
+from p3i.search.result import Candidate, SynthesisResult
 
 if TYPE_CHECKING:
     import numpy as np
@@ -165,26 +165,27 @@ def _relative(photo: str | os.PathLike[str], folder: Path) -> str | None:
 def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) -> SynthesisResult:
     """`result` with the header of DESIGN 2.5 on each of its programs."""
 
-    def titled(program: Program, structure: str, score: float, margin: float | None) -> Program:
-        facts: dict[str, str | int | float] = {"structure": structure, "score": round(score, 4)}
+    def titled(answer: SynthesisResult | Candidate, program: Program, margin: float | None) -> Program:
+        facts: dict[str, str | int | float] = {
+            "structure": answer.structure or "lattice",
+            "score": round(answer.score or 0.0, 4),
+        }
         if margin is not None:
             facts["margin"] = round(margin, 4)
-        facts |= {"features": result.features, "focal_from": result.focal_source, "seed": result.seed}
+        facts |= {"features": result.features, "focal_from": answer.focal_source, "seed": result.seed}
         header = Header(
             canvas=(size.width, size.height),
-            focal_mm=result.focal_mm,
+            focal_mm=answer.focal_mm,
             image=name,
             fit=tuple(facts.items()),
         )
         return dataclasses.replace(program, header=header)
 
     candidates = tuple(
-        dataclasses.replace(
-            candidate, program=titled(candidate.program, candidate.structure, candidate.score, None)
-        )
+        dataclasses.replace(candidate, program=titled(candidate, candidate.program, None))
         for candidate in result.candidates
     )
     if result.program is None:
         return dataclasses.replace(result, candidates=candidates)
-    program = titled(result.program, result.structure or "lattice", result.score or 0.0, result.margin)
+    program = titled(result, result.program, result.margin)
     return dataclasses.replace(result, program=program, candidates=candidates)

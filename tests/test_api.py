@@ -43,7 +43,14 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
             stop=StopReason.FOUND,
             structure="lattice",
             score=0.7,
-            candidates=(Candidate(program=program, score=0.7, structure="lattice"),),
+            candidates=(
+                Candidate(
+                    program=program, score=0.7, structure="lattice", focal_mm=31.5, focal_source="exif"
+                ),
+                Candidate(
+                    program=program, score=0.6, structure="circular", focal_mm=50.0, focal_source="pattern"
+                ),
+            ),
             focal_mm=31.5,
             focal_source="exif",
             features=config.features,
@@ -88,6 +95,8 @@ def test_synth_puts_canvas_focal_photo_and_fit_into_the_header(calls, photo: Pat
         "seed": 3,
     }
     assert result.candidates[0].program.header == header
+    other = result.candidates[1].program.header
+    assert other is not None and (other.focal_mm, dict(other.fit)["focal_from"]) == (50.0, "pattern")
 
 
 def test_synth_takes_an_image_in_memory_and_names_no_photo_then(calls, photo: Path) -> None:

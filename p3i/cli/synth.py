@@ -19,6 +19,20 @@ from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, senten
 from p3i.search.result import StopReason, SynthesisResult
 
 
+class FocalType(click.ParamType):
+    """A focal length in mm, or the word auto."""
+
+    name = "MM|auto"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
+        if str(value).strip().lower() == "auto":
+            return "auto"
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"{value!r} is neither a focal length in mm nor auto", param, ctx)
+
+
 @click.command("synth", short_help="Find the camera and the program of a photo's pattern.")
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True)
 @click.option(
@@ -50,7 +64,7 @@ from p3i.search.result import StopReason, SynthesisResult
     metavar="X,Y,W,H|POINTS",
     help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@click.option("--focal", "focal_mm", type=FocalType(), metavar="MM|auto", help=sentence("focal_mm"))
 @search_options.features
 @search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))
@@ -285,7 +299,7 @@ def _talk(call: Call, outcome: Outcome) -> None:
     if call.verbose:
         score = "" if result.score is None else f", score {result.score:.2f}"
         margin = "" if result.margin is None else f" (margin {result.margin:.2f})"
-        focal = f"focal {result.focal_mm:g} mm ({result.focal_source})"
+        focal = f"focal {result.focal_mm:.4g} mm, {result.focal_reason or result.focal_source}"
         found = f"{result.structure} of {len(result.centers)} objects{score}{margin}, {focal}"
         message = f"{name}: {found}, {outcome.seconds:.1f} s"
         report.line(message, as_json=as_json, kind="info", image=name)

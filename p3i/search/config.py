@@ -36,7 +36,9 @@ class SearchConfig:
     ] = "oriented"
     weights: Annotated[Path | None, "A file with the weights of the features (alexnet needs one)."] = None
     focal_mm: Annotated[
-        float | None, "35 mm-equivalent focal length; by default that of the photo's EXIF data, else 35."
+        float | Literal["auto"] | None,
+        "35 mm-equivalent focal length, or auto: estimated from the pattern where that fixes it. "
+        "By default that of the photo's EXIF data, else 35.",
     ] = None
     extent: Annotated[
         Extent, "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
@@ -61,7 +63,11 @@ class SearchConfig:
             _one_of("features", part, FEATURES)
         _one_of("extent", self.extent, EXTENTS)
         _one_of("device", self.device, DEVICES)
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+        if isinstance(self.focal_mm, str):
+            _one_of("the focal length, where no number,", self.focal_mm, ("auto",))
+        elif self.focal_mm is not None and not (
+            math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000
+        ):
             raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
         if self.time_s is not None and not self.time_s > 0:
             raise UsageError(f"the time must be more than 0 seconds, not {self.time_s:g}")

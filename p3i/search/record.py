@@ -23,7 +23,13 @@ def answer_record(result: SynthesisResult, *, image: str, seconds: float) -> dic
         "height": height,
         "program": format_program(program),
         "structure": result.structure,
-        "camera": {"rx": program.camera.rx_deg, "ry": program.camera.ry_deg, "focal": result.focal_mm},
+        "camera": {
+            "rx": program.camera.rx_deg,
+            "ry": program.camera.ry_deg,
+            "focal": result.focal_mm,
+            "focal_from": result.focal_source,
+            "focal_reason": result.focal_reason,
+        },
         "centers": [[round(x, 2), round(y, 2), i, j] for x, y, i, j in result.centers],
         "score": _rounded(result.score),
         "margin": _rounded(result.margin),
@@ -45,6 +51,7 @@ def _candidate_record(candidate: Candidate) -> dict[str, Any]:
     return {
         "program": format_program(candidate.program),
         "structure": candidate.structure,
+        "focal": candidate.focal_mm,
         "score": _rounded(candidate.score),
     }
 

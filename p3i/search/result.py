@@ -3,6 +3,7 @@
 Imports neither torch nor numpy.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
@@ -13,7 +14,16 @@ NEEDED = 0.13
 """The score that an answer must reach (docs/benchmarks.md says what it was calibrated on)."""
 
 StructureFound = Literal["lattice", "circular", "hybrid"]
-FocalSource = Literal["option", "header", "exif", "default"]
+FocalSource = Literal["option", "header", "exif", "default", "pattern"]
+
+FOCAL_REASONS: Mapping[FocalSource, str] = {
+    "option": "given by the caller",
+    "header": "taken from the program's header",
+    "exif": "read from the photo's EXIF data",
+    "default": "assumed, since nothing tells",
+    "pattern": "estimated from the pattern",
+}
+"""Why a focal was used, where its finder says no more; completes "focal 35 mm, ..."."""
 
 
 class StopReason(Enum):
@@ -34,11 +44,14 @@ class StopReason(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """One program that the search weighed, with its normalised score (docs/search.md)."""
+    """One program that the search weighed, with its normalised score (docs/search.md) and its own focal."""
 
     program: Program
     score: float
     structure: StructureFound
+    focal_mm: float = 35.0
+    focal_source: FocalSource = "default"
+    focal_reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +61,9 @@ class SynthesisResult:
     `program` is None where nothing convinced; then `score` is the best that was seen, if any, and
     `needed` what an answer must reach. `margin` is the lead over the best candidate of another meaning.
     `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
-    and the loop indices (i, j). `candidates` are in order, the best first, at most `SearchConfig.top`.
+    and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
+    why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at
+    most `SearchConfig.top`.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
     """
 
@@ -62,6 +77,7 @@ class SynthesisResult:
     centers: tuple[tuple[float, float, int, int], ...] = ()
     focal_mm: float = 35.0
     focal_source: FocalSource = "default"
+    focal_reason: str = ""
     features: str = ""
     seed: int = 0
     notes: tuple[str, ...] = ()

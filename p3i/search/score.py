@@ -48,7 +48,8 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
     """
     limit_threads(config.threads)
     header = program.header.focal_mm if program.header is not None else None
-    focal_mm = next(mm for mm in (config.focal_mm, header, image.focal_mm, 35.0) if mm is not None)
+    given = None if config.focal_mm == "auto" else config.focal_mm
+    focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
     evidence = Evidence(image, config, focal_mm)
     pattern = _without_doubles(compile(program))
     points, in_front = pattern.centers_px(size=image.size, focal_mm=focal_mm)

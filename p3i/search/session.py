@@ -62,7 +62,8 @@ class Answer:
     """A finished program for the photo.
 
     `score` says how sure it is (0..1, comparable between photos), `worth` how much of this photo it explains
-    (comparable between programs for one photo).
+    (comparable between programs for one photo). `focal_mm` is the focal that the program is told with, None
+    where it is the one assumed; then `focal_reason` may say why no other was found.
     """
 
     program: Program
@@ -70,3 +71,5 @@ class Answer:
     score: float
     worth: float
     notes: tuple[str, ...] = ()
+    focal_mm: float | None = None
+    focal_reason: str = ""

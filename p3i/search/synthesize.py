@@ -8,7 +8,14 @@ from p3i.interp import unroll
 from p3i.interp.camera import Camera, project
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence
-from p3i.search.result import NEEDED, Candidate, FocalSource, StopReason, SynthesisResult
+from p3i.search.result import (
+    FOCAL_REASONS,
+    NEEDED,
+    Candidate,
+    FocalSource,
+    StopReason,
+    SynthesisResult,
+)
 from p3i.search.session import Answer, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
@@ -35,18 +42,12 @@ def synthesize(
     The program has no header yet. A KeyboardInterrupt ends the search with the best that was found.
     """
     limit_threads(config.threads)
-    focal_mm, focal_source = focal_of(image, config)
+    assumed = focal_of(image, config)
+    focal_mm, _ = assumed
 
     def result(program: Program | None, stop: StopReason, **more: object) -> SynthesisResult:
-        return SynthesisResult(
-            program=program,
-            stop=stop,
-            focal_mm=focal_mm,
-            focal_source=focal_source,
-            features=config.features,
-            seed=config.seed,
-            **more,  # pyright: ignore[reportArgumentType]
-        )
+        told = {**_focal_facts(None, assumed), "features": config.features, "seed": config.seed, **more}
+        return SynthesisResult(program=program, stop=stop, **told)  # pyright: ignore[reportArgumentType]
 
     hopeless = _hopeless(image)
     if hopeless is not None:
@@ -75,21 +76,36 @@ def synthesize(
         margin=margin / max(first.worth, 1e-9),
         needed=NEEDED,
         candidates=tuple(
-            Candidate(program=answer.program, score=answer.score, structure=answer.structure)
+            Candidate(
+                program=answer.program,
+                score=answer.score,
+                structure=answer.structure,
+                **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
+            )
             for answer in good[: config.top]
         ),
-        centers=centers_px(first.program, image, focal_mm),
+        centers=centers_px(first.program, image, first.focal_mm or focal_mm),
         notes=first.notes,
+        **_focal_facts(first, assumed),
     )
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
     """The focal that is assumed, and why: the option, the photo's EXIF data, or 35 mm."""
-    if config.focal_mm is not None:
+    if config.focal_mm is not None and config.focal_mm != "auto":
         return config.focal_mm, "option"
     if image.focal_mm is not None:
         return image.focal_mm, "exif"
     return 35.0, "default"
+
+
+def _focal_facts(answer: Answer | None, assumed: tuple[float, FocalSource]) -> dict[str, object]:
+    """The focal of an answer, its source and the reason, as fields of a result; None is told as assumed."""
+    mm, source = assumed
+    if answer is not None and answer.focal_mm is not None:
+        mm, source = answer.focal_mm, "pattern"
+    reason = answer.focal_reason if answer is not None else ""
+    return {"focal_mm": mm, "focal_source": source, "focal_reason": reason or FOCAL_REASONS[source]}
 
 
 def centers_px(program: Program, image: Image, focal_mm: float) -> tuple[tuple[float, float, int, int], ...]:

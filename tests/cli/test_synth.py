@@ -17,7 +17,7 @@ import pytest
 from p3i.cli.main import run
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search.config import SearchConfig
-from p3i.search.result import Candidate, StopReason, SynthesisResult
+from p3i.search.result import FOCAL_REASONS, Candidate, StopReason, SynthesisResult
 
 # What the search is to do with a photo of this grey level.
 FINDS, FINDS_NOTHING, HAS_A_BUG, IS_INTERRUPTED, IS_LATE = 200, 0, 40, 80, 120
@@ -61,6 +61,7 @@ class Search:
             centers=((10.123456, 20.0, 0, 0), (30.5, 20.25, 1, 0)),
             focal_mm=config.focal_mm or 35.0,
             focal_source="option" if config.focal_mm else "default",
+            focal_reason=FOCAL_REASONS["option" if config.focal_mm else "default"],
             features=config.features,
             seed=config.seed,
         )
@@ -112,7 +113,13 @@ def test_jsonl_has_the_documented_keys_in_order(photo, capsys) -> None:
         "score", "margin", "seconds", "features", "seed",
     ]  # fmt: skip
     assert (record["image"], record["width"], record["height"]) == ("a.png", 64, 48)
-    assert record["camera"] == {"rx": -31.2, "ry": 8.4, "focal": 35.0}
+    assert record["camera"] == {
+        "rx": -31.2,
+        "ry": 8.4,
+        "focal": 35.0,
+        "focal_from": "default",
+        "focal_reason": "assumed, since nothing tells",
+    }
     assert record["centers"] == [[10.12, 20.0, 0, 0], [30.5, 20.25, 1, 0]]
     assert record["program"].startswith("# /// p3p\n")
 
@@ -352,9 +359,9 @@ def test_structures_to_come_are_refused_by_name(photo, capsys) -> None:
 
 def test_verbose_names_the_focal_and_where_it_came_from(photo, capsys) -> None:
     assert run(["synth", "-v", photo("a.png")]) == 0
-    assert "focal 35 mm (default)" in capsys.readouterr().err
+    assert "focal 35 mm, assumed, since nothing tells" in capsys.readouterr().err
     assert run(["synth", "-v", "--focal", "28", "a.png"]) == 0
-    assert "focal 28 mm (option)" in capsys.readouterr().err
+    assert "focal 28 mm, given by the caller" in capsys.readouterr().err
 
 
 def test_equal_calls_print_equal_json_apart_from_the_seconds(photo, capsys) -> None:
