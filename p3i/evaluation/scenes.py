@@ -1,201 +1,39 @@
-"""Rendered scenes with known truth: photo-like pictures of lattices, for tests and as sample pictures.
+"""Rendered scenes with known truth: photo-like pictures of lattices, rings and hybrids, for tests and examples.
 
 Everything follows from a seed: the same seed gives the same pixels.
 """
 
-import dataclasses
-import math
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
-import cv2
-import numpy as np
+from p3i.evaluation.annotations import annotation
+from p3i.evaluation.hybrid_scenes import hybrid_scene
+from p3i.evaluation.lattice_scenes import SceneOptions, lattice_scene
+from p3i.evaluation.ring_painting import RingOptions
+from p3i.evaluation.ring_scenes import ring_scene
+from p3i.evaluation.scene import Scene
+from p3i.search.result import StructureFound
 
-from p3i.evaluation.looks import LOOKS, Random, texture, varied
-from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Program
-from p3i.interp.camera import Camera
-from p3i.interp.unroll import nest, points
-from p3i.paint.sprite import lay, sprite_of
-from p3i.paint.view import camera_view
-from p3i.size import Size
-from p3i.vision.decode import Source
-from p3i.vision.image import Image
+__all__ = [
+    "SCENES",
+    "RingOptions",
+    "Scene",
+    "SceneOptions",
+    "annotation",
+    "hybrid_scene",
+    "lattice_scene",
+    "ring_scene",
+    "scene",
+]
 
-_SIZE = Size(640, 480)
-
-_LEAST_VISIBLE = 12
-"""Objects that a scene must show."""
-
-_LEAST_SPACING_PX = 16.0
-"""Objects stand at least this far apart in the picture, or nothing could be told from it."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SceneOptions:
-    """What scenes are made of: `jitter` (0..1) is how much objects differ, `noise` that of the pixels."""
-
-    size: Size = _SIZE
-    tilt_deg: tuple[float, float] = (5.0, 60.0)
-    focal_mm: float = 35.0
-    look: str | None = None
-    jitter: float = 0.3
-    noise: float = 0.015
-    clutter: int = 4
-    guards: float = 0.2
-    """The share of scenes whose outline a guard cuts."""
+SCENES: Mapping[StructureFound, Callable[..., Scene]] = {
+    "lattice": lattice_scene,
+    "circular": ring_scene,
+    "hybrid": hybrid_scene,
+}
+"""The maker of scenes of each structure, from a seed and options of its own."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
-    """A picture and the truth about it.
-
-    `pixels` uint8 [H, W, 3] RGB; `centers_px` [N, 2] and `index` [N, 2] are the objects of `program` that
-    lie on the picture (their true places, before jitter).
-    """
-
-    pixels: np.ndarray
-    program: Program
-    centers_px: np.ndarray
-    index: np.ndarray
-    look: str
-    seed: int
-
-    @property
-    def size(self) -> Size:
-        """The canvas."""
-        return Size(self.pixels.shape[1], self.pixels.shape[0])
-
-    @property
-    def camera(self) -> Camera:
-        """The true camera."""
-        return Camera.of(self.program)
-
-    def image(self) -> Image:
-        """The picture as the vision part takes it."""
-        pixels = self.pixels.astype(np.float32) / 255
-        return Image(pixels, np.ones(pixels.shape[:2], bool))
-
-
-def lattice_scene(seed: int, options: SceneOptions | None = None, **changes: Any) -> Scene:
-    """The scene of a seed: a random lattice under a random camera. `changes` are fields of SceneOptions."""
-    options = dataclasses.replace(options or SceneOptions(), **changes)
-    random = np.random.default_rng(seed)
-    look = options.look or str(random.choice(sorted(LOOKS)))
-    while True:
-        program = _program(random, options)
-        centers_px, index, spacing_px = _truth(program, options.size)
-        if len(index) >= _LEAST_VISIBLE and spacing_px >= _LEAST_SPACING_PX:
-            break
-    return Scene(_pixels(program, look, random, options), program, centers_px, index, look, seed)
-
-
-def annotation(scene: Scene, file: str) -> dict[str, Any]:
-    """The truth in the form of the annotated photo sets: plane pixels are program units times `unit_px`."""
-    unit, parts = scene.size.unit_px, nest(scene.program)
-    x, y = parts.draw.x, parts.draw.y
-    assert isinstance(x, Affine) and isinstance(y, Affine)
-    camera = scene.camera
-    return {
-        "file": file,
-        "width": scene.size.width,
-        "height": scene.size.height,
-        "structure": "lattice",
-        "object": scene.look,
-        "centers": np.round(scene.centers_px, 2).tolist(),
-        "indices": scene.index.tolist(),
-        "pose": {"rx": camera.rx_deg, "ry": camera.ry_deg, "focal_mm": camera.focal_mm},
-        "pose_reliable": True,
-        "lattice": {
-            "base": [round(unit * x.constant, 4), round(unit * y.constant, 4)],
-            "u": [round(unit * x.i, 4), round(unit * y.i, 4)],
-            "v": [round(unit * x.j, 4), round(unit * y.j, 4)],
-            "i_range": [int(scene.index[:, 0].min()), int(scene.index[:, 0].max())],
-            "j_range": [int(scene.index[:, 1].min()), int(scene.index[:, 1].max())],
-        },
-        "roi": cv2.convexHull(scene.centers_px.astype(np.float32))[:, 0].round(2).tolist(),
-        "source": f"rendered by p3i, seed {scene.seed}",
-    }
-
-
-def _program(random: Random, options: SceneOptions) -> Program:
-    """A random lattice: u about horizontal, a reduced basis, indices around the middle of the picture."""
-    tilt = math.radians(random.uniform(*options.tilt_deg))
-    azimuth = random.uniform(0, 2 * math.pi)
-    normal = (math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt))
-    camera = Camera.from_normal(normal)
-    turn = math.radians(random.uniform(-30, 30))
-    across = math.radians(random.choice([90.0, random.uniform(70, 110)]))
-    length, ratio = random.uniform(7, 17), random.choice([1.0, random.uniform(0.75, 1.33)])
-    u = (length * math.cos(turn), length * math.sin(turn))
-    v = (length * ratio * math.cos(turn + across), length * ratio * math.sin(turn + across))
-    count_i, count_j = (int(random.integers(4, 12)) for _ in range(2))
-    middle = [random.uniform(-8, 8) - (count_i - 1) / 2 * u[k] - (count_j - 1) / 2 * v[k] for k in (0, 1)]
-    x, y = (Affine(round(u[k], 2), round(v[k], 2), round(middle[k], 2)) for k in (0, 1))
-    body: Draw | If = Draw(x, y)
-    if random.random() < options.guards:
-        cut = int(random.integers(2, max(3, (count_i + count_j) // 2)))
-        body = If(Affine(1, 1, -cut), body)
-    inner = For("j", Affine(), Affine(constant=count_j), body)
-    world = For("i", Affine(), Affine(constant=count_i), inner)
-    pose = CameraPose(round(camera.rx_deg, 2), round(camera.ry_deg, 2))
-    header = Header(canvas=(options.size.width, options.size.height), focal_mm=options.focal_mm)
-    return Program(pose, world, header=header)
-
-
-def _truth(program: Program, size: Size) -> tuple[np.ndarray, np.ndarray, float]:
-    """The visible objects in pixels and their (i, j), and how close the closest two of them stand."""
-    drawn = np.array(points(program), dtype=np.float64).reshape(-1, 4)
-    centers_px, depth = camera_view(Camera.of(program), size).project(drawn[:, :2])
-    with np.errstate(invalid="ignore"):
-        seen = (depth > 0) & (centers_px >= 0).all(axis=1)
-        seen &= (centers_px <= (size.width - 1, size.height - 1)).all(axis=1)
-    centers_px, index = centers_px[seen], drawn[seen, 2:].astype(np.int64)
-    if len(index) < 2:
-        return centers_px, index, 0.0
-    apart = np.linalg.norm(centers_px[:, None] - centers_px, axis=2) + 1e9 * np.eye(len(centers_px))
-    return centers_px, index, float(apart.min())
-
-
-def _pixels(program: Program, look: str, random: Random, options: SceneOptions) -> np.ndarray:
-    size = options.size
-    canvas = texture(random, size.height, size.width)
-    _add_clutter(canvas, random, options.clutter)
-    first = LOOKS[look](random)
-    kinds = [varied(first, random, jitter=options.jitter) for _ in range(24)]
-    sprites = [sprite_of(_image(kind)) for kind in kinds]
-    drawn = np.array(points(program), dtype=np.float64).reshape(-1, 4)[:, :2]
-    draw = nest(program).draw
-    assert isinstance(draw.x, Affine) and isinstance(draw.y, Affine)
-    spacing = min(math.hypot(draw.x.i, draw.y.i), math.hypot(draw.x.j, draw.y.j))
-    moved = drawn + random.normal(0, 0.05 * options.jitter * spacing, drawn.shape)
-    turns = random.permutation(max(1, len(sprites)))
-    layer = lay(
-        camera_view(Camera.of(program), size),
-        [sprites[turn] for turn in turns],
-        moved,
-        units=spacing * random.uniform(0.6, 0.95),
-    ).astype(np.float32)
-    alpha = layer[..., 3:] / 255
-    shadow = cv2.GaussianBlur(np.roll(alpha[..., 0], (2, 3), axis=(0, 1)), (0, 0), 2.5)[..., None]
-    canvas *= 1 - 0.4 * shadow
-    canvas += alpha * (layer[..., :3] / 255 - canvas)
-    light = 1 + random.uniform(-0.25, 0.25) * np.linspace(-1, 1, size.width)[None, :, None]
-    light = light + random.uniform(-0.25, 0.25) * np.linspace(-1, 1, size.height)[:, None, None]
-    canvas = cv2.GaussianBlur(canvas * light.astype(np.float32), (0, 0), random.uniform(0.4, 0.9))
-    canvas = canvas + random.normal(0, options.noise, canvas.shape).astype(np.float32)
-    return np.rint(np.clip(canvas, 0, 1) * 255).astype(np.uint8)
-
-
-def _add_clutter(canvas: np.ndarray, random: Random, count: int) -> None:
-    """Paint things that belong to no pattern onto a ground, in place."""
-    height, width = canvas.shape[:2]
-    for _ in range(count):
-        center = (int(random.uniform(0, width)), int(random.uniform(0, height)))
-        axes = tuple(int(random.uniform(0.03, 0.15) * width) for _ in range(2))
-        colour = tuple(float(part) for part in random.uniform(0.2, 0.9, 3))
-        cv2.ellipse(canvas, center, axes, float(random.uniform(0, 180)), 0, 360, colour, -1, cv2.LINE_AA)
-
-
-def _image(sprite: np.ndarray) -> Image:
-    alpha = np.ascontiguousarray(sprite[..., 3])
-    return Image(np.ascontiguousarray(sprite[..., :3]), alpha >= 0.5, None, Source("PNG", alpha=alpha))
+def scene(structure: StructureFound, seed: int, **changes: Any) -> Scene:
+    """The scene of a seed; `changes` are fields of SceneOptions for lattices, of RingOptions for the others."""
+    return SCENES[structure](seed, **changes)
