@@ -1,7 +1,7 @@
 """The truth about a scene, written as the annotated photo sets write theirs.
 
-Convention: plane coordinates are plane pixels, program units times `Size.unit_px`, on the plane that a
-35 mm lens would see: a scene drawn with another focal is told by its vanishing line, and its rings are ellipses there.
+Convention: plane coordinates are plane pixels, program units times `Size.unit_px`, on the plane that a 35 mm
+lens would see: a scene drawn with another focal is told by its vanishing line, its rings are ellipses there.
 """
 
 from typing import Any

@@ -1,6 +1,7 @@
-"""Rendered hybrids: rings around one centre, arcs that grow from ring to ring, a ring repeated along a line."""
+"""Rendered hybrids: rings around one centre, arcs that grow from ring to ring, a ring along a line."""
 
 import dataclasses
+import itertools
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,8 @@ import numpy as np
 from p3i.evaluation import stage
 from p3i.evaluation.looks import Random
 from p3i.evaluation.ring_layout import RingLayout
-from p3i.evaluation.ring_painting import RingOptions, Staged, painted, random_camera, random_size, staged
+from p3i.evaluation.ring_painting import painted
+from p3i.evaluation.ring_plan import RingOptions, Staged, planned
 from p3i.evaluation.scene import Scene
 
 HYBRIDS = ("concentric", "fan", "row")
@@ -18,7 +20,10 @@ HYBRIDS = ("concentric", "fan", "row")
 def hybrid_scene(
     seed: int, options: RingOptions | None = None, *, kind: str | None = None, **changes: Any
 ) -> Scene:
-    """The hybrid of a seed; `kind` is one of HYBRIDS, by default by turns. `changes` are fields of RingOptions."""
+    """The hybrid of a seed; `kind` is one of HYBRIDS, by default by turns.
+
+    `changes` are fields of RingOptions. Raises UsageError as `ring_scene` does.
+    """
     options = dataclasses.replace(options or RingOptions(), **changes)
     random = np.random.default_rng([seed, 2])
     kind = kind or (*HYBRIDS, "row")[seed % 4]
@@ -29,18 +34,16 @@ def hybrid_scene(
 
 
 def _plan(kind: str, random: Random, options: RingOptions) -> Staged:
-    size = random_size(random, options)
     make = {"concentric": _concentric, "fan": _fan, "row": _row}[kind]
-    while True:
-        camera = random_camera(random, options)
-        for _ in range(300):
-            layout = make(random)
-            radius = min(map(layout.radius_of, layout.counts()))
-            cap = min(layout.chord() / 1.6, 0.6 * radius, 12.0)
-            diameter = round(float(cap * random.uniform(0.65, 1)), 2)
-            plan = staged(layout, camera, size, diameter, least_seen=1.0 if random.random() < 0.8 else 0.92)
-            if plan is not None:
-                return plan
+    swelling = kind == "concentric" and random.random() < 0.3
+
+    def draw(random: Random) -> tuple[RingLayout, float]:
+        layout = make(random)
+        least = min(map(layout.radius_of, layout.counts()))
+        cap = min(layout.chord() / 1.6, 0.6 * least, 12.0)
+        return layout, round(float(cap * random.uniform(0.7, 1)), 2)
+
+    return planned(draw, random, options, cut=0 if kind == "fan" else 0.1, swelling=swelling)
 
 
 def _concentric(random: Random) -> RingLayout:
@@ -60,9 +63,9 @@ def _concentric(random: Random) -> RingLayout:
 
 def _fan(random: Random) -> RingLayout:
     """Table 1's count: ring i has `count*i` objects at one step, so the arcs get longer with i."""
-    rings = int(random.integers(2, 5))
-    count = int(random.integers(3, 8))
-    first = 2 if rings < 4 and random.random() < 0.3 else 1
+    rings = int(random.choice([2, 3, 3, 4, 4]))
+    count = int(random.integers(3, 8)) if rings > 2 else int(random.integers(5, 8))
+    first = 2 if rings == 3 and random.random() < 0.4 else 1
     last = first + rings - 1
     # A whole part of the circle that the longest arc fills, or nearly.
     slots = count * last + int(random.choice([0, 2, 3, count]))
@@ -115,7 +118,7 @@ def _plates(plan: Staged, random: Random, options: RingOptions) -> tuple[stage.P
         radii = sorted((layout.radius_of(i) for i in rings), reverse=True)
         edges = [radii[0] + beyond]
         if random.random() < 0.6:  # a change of colour between each two rings
-            edges += [(outer + inner) / 2 for outer, inner in zip(radii, radii[1:], strict=False)]
+            edges += [(outer + inner) / 2 for outer, inner in itertools.pairwise(radii)]
         edges.append(hub * radii[-1])
         return (stage.Plate(center=layout.center, edges=tuple(edges)),)
     spokes = int(random.choice([0, 0, 3, 4, layout.count]))

@@ -1,7 +1,7 @@
 """Rings in numbers: one ring, rings around one centre, or a ring repeated along a line, and what they fix.
 
-All three are `x = radius*Cos(angle) + offset`, `y = radius*Sin(angle) + offset` with radius and offset affine in i and
-the angle in j, so one record of numbers holds them.
+All three are `x = radius*Cos(angle) + offset`, `y = radius*Sin(angle) + offset` with radius and offset affine
+in i and the angle in j, so one record of numbers holds them.
 """
 
 import dataclasses
@@ -26,8 +26,8 @@ class RingLayout:
     """The numbers of a program of rings; units and degrees.
 
     Ring i has its centre at `center + i*along`, the radius `radius + i*growth`, and its object j at the
-    angle `phase_deg + j*step_deg`. `rings` is None for a single ring without a loop over i, else the range of i.
-    j runs through `count` objects, or through `count*i` where `counted_by_ring`, as in Table 1.
+    angle `phase_deg + j*step_deg`. `rings` is None for a single ring without a loop over i, else the range
+    of i. j runs through `count` objects, or through `count*i` where `counted_by_ring`, as in Table 1.
     """
 
     center: tuple[float, float]
@@ -46,9 +46,9 @@ class RingLayout:
         return not self.counted_by_ring and abs(self.count * self.step_deg - 360) < 1e-6
 
     def counts(self) -> dict[int, int]:
-        """How many objects each ring has; a single ring is ring 0."""
+        """How many objects each ring has; a single ring is ring 1, since an unbound i reads as 1."""
         if self.rings is None:
-            return {0: self.count}
+            return {1: self.count}
         return {i: self.count * i if self.counted_by_ring else self.count for i in range(*self.rings)}
 
     def center_of(self, i: int) -> np.ndarray:
@@ -92,7 +92,7 @@ def pose_sigma_deg(layout: RingLayout, camera: Camera, size: Size, *, jitter_uni
     """The standard error of the tilt in degrees, where all objects are read as well as they can be.
 
     Least squares with the focal and the structure known; objects stray by `jitter_units` on the plane and
-    their places are read to a quarter of a pixel. Below a third of a degree a picture can be held to one degree.
+    their places are read to a quarter of a pixel.
     """
     around = _numbers(layout, camera)
     _, _, seen = on_canvas(layout.program(camera, size), size)

@@ -1,7 +1,7 @@
 """How the objects of rendered rings look: dots that stand upright, and marks that point away from the centre.
 
-Convention: as in looks.py, RGBA float32 [S, S, 4]; a mark points up, and lies within the circle that touches the
-sprite's sides, so that turning cuts nothing off.
+Convention: as in looks.py, RGBA float32 [S, S, 4]; a mark points up, and lies within the circle that
+touches the sprite's sides, so that turning cuts nothing off.
 """
 
 import cv2
@@ -17,8 +17,8 @@ def _tick(random: Random) -> np.ndarray:
     body = inside(
         0.1 - np.hypot(*np.maximum(np.abs([x, y / 1.3]) - np.array([wide - 0.1, 0.52])[:, None, None], 0))
     )
-    shade = np.where(y > 0.3, random.uniform(0.5, 0.9), 1.0)
-    return rgba(random_colour(random) * cv2.GaussianBlur(shade.astype(np.float32), (0, 0), 2)[..., None], body)
+    shade = 1 - random.uniform(0.1, 0.5) * inside(y - 0.3)
+    return rgba(random_colour(random) * shade[..., None], body)
 
 
 def _drop(random: Random) -> np.ndarray:

@@ -8,7 +8,8 @@ import numpy as np
 from p3i.evaluation import stage
 from p3i.evaluation.looks import Random
 from p3i.evaluation.ring_layout import RingLayout
-from p3i.evaluation.ring_painting import RingOptions, Staged, painted, random_camera, random_size, staged
+from p3i.evaluation.ring_painting import painted
+from p3i.evaluation.ring_plan import RingOptions, Staged, planned
 from p3i.evaluation.scene import Scene
 
 _ARCS = 0.2
@@ -16,7 +17,10 @@ _ARCS = 0.2
 
 
 def ring_scene(seed: int, options: RingOptions | None = None, **changes: Any) -> Scene:
-    """The ring of a seed under a random camera. `changes` are fields of RingOptions."""
+    """The ring of a seed under a random camera. `changes` are fields of RingOptions.
+
+    Raises UsageError where the options leave no room for a ring that can be seen well.
+    """
     options = dataclasses.replace(options or RingOptions(), **changes)
     random = np.random.default_rng([seed, 1])
     plan = _plan(random, options)
@@ -26,38 +30,28 @@ def ring_scene(seed: int, options: RingOptions | None = None, **changes: Any) ->
 
 
 def _plan(random: Random, options: RingOptions) -> Staged:
-    """A ring that the picture shows well; tilts come evenly, so the rest is drawn again for each of them."""
-    size = random_size(random, options)
+    """An open or closed ring; its count is drawn first, and evenly in its logarithm."""
     is_arc = random.random() < _ARCS
-    while True:
-        camera = random_camera(random, options)
-        for _ in range(200):
-            layout = _layout(random, is_arc=is_arc)
-            cap = min(layout.chord() / 1.6, 0.55 * layout.radius, 14.0)
-            diameter = round(float(cap * random.uniform(0.6, 1)), 2)
-            plan = staged(layout, camera, size, diameter, least_seen=1.0 if random.random() < 0.8 else 0.88)
-            if plan is not None:
-                return plan
-
-
-def _layout(random: Random, *, is_arc: bool) -> RingLayout:
-    radius = float(np.exp(random.uniform(np.log(12), np.log(40))))
-    slots = round(float(np.exp(random.uniform(np.log(4.6), np.log(36.4)))))
+    least = 10 if is_arc else 5
+    slots = round(float(np.exp(random.uniform(np.log(least - 0.4), np.log(36.4)))))
     count = slots
     if is_arc:
-        slots = max(slots, 8)
         # At least two slots stay empty, so that an open ring is no ring with a gap.
         count = int(np.clip(round(slots * random.uniform(0.6, 0.88)), np.ceil(0.6 * slots), slots - 2))
-    step_deg = 360 / slots
-    phase = random.uniform(0, 360 if is_arc else step_deg)
-    center = random.uniform(-22, 22, 2)
-    return RingLayout(
-        center=(round(float(center[0]), 2), round(float(center[1]), 2)),
-        radius=round(radius, 2),
-        step_deg=step_deg,
-        count=count,
-        phase_deg=round(float(phase), 2),
-    )
+
+    def draw(random: Random) -> tuple[RingLayout, float]:
+        center = random.uniform(-22, 22, 2)
+        layout = RingLayout(
+            center=(round(float(center[0]), 2), round(float(center[1]), 2)),
+            radius=round(float(random.uniform(12, 40)), 2),
+            step_deg=360 / slots,
+            count=count,
+            phase_deg=round(float(random.uniform(0, 360 if is_arc else 360 / slots)), 2),
+        )
+        cap = min(layout.chord() / 1.6, 0.5 * layout.radius, 14.0)
+        return layout, round(float(cap * random.uniform(0.7, 1)), 2)
+
+    return planned(draw, random, options, cut=0 if is_arc else 0.12)
 
 
 def _plates(plan: Staged, random: Random, options: RingOptions) -> tuple[stage.Plate, ...]:

@@ -56,7 +56,7 @@ class Scene:
 def on_canvas(program: Program, size: Size) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The drawn objects and which of them the canvas shows.
 
-    Returns pixels [N, 2] (nan behind the camera), indices int64 [N, 2] and a mask [N], in the order of the loops.
+    Returns pixels [N, 2] (nan behind the camera), indices int64 [N, 2] and a mask [N], in loop order.
     """
     drawn = np.array(points(program), dtype=np.float64).reshape(-1, 4)
     centers_px, depth = camera_view(Camera.of(program), size).project(drawn[:, :2])

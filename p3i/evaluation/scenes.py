@@ -1,4 +1,4 @@
-"""Rendered scenes with known truth: photo-like pictures of lattices, rings and hybrids, for tests and examples.
+"""Rendered scenes with known truth: photo-like pictures of lattices, rings and hybrids.
 
 Everything follows from a seed: the same seed gives the same pixels.
 """
@@ -9,7 +9,7 @@ from typing import Any
 from p3i.evaluation.annotations import annotation
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.lattice_scenes import SceneOptions, lattice_scene
-from p3i.evaluation.ring_painting import RingOptions
+from p3i.evaluation.ring_plan import RingOptions
 from p3i.evaluation.ring_scenes import ring_scene
 from p3i.evaluation.scene import Scene
 from p3i.search.result import StructureFound
@@ -35,5 +35,5 @@ SCENES: Mapping[StructureFound, Callable[..., Scene]] = {
 
 
 def scene(structure: StructureFound, seed: int, **changes: Any) -> Scene:
-    """The scene of a seed; `changes` are fields of SceneOptions for lattices, of RingOptions for the others."""
+    """The scene of a seed; `changes` are fields of SceneOptions for lattices, else of RingOptions."""
     return SCENES[structure](seed, **changes)

@@ -25,26 +25,36 @@ class Plate:
     spoke_phase_deg: float = 0.0
 
 
-def add_plate(canvas: np.ndarray, view: View, plate: Plate, random: Random, *, base: np.ndarray) -> None:
-    """Paint a plate onto the plane; its outermost part has the colour `base` [3]."""
+def muted(canvas: np.ndarray, random: Random) -> np.ndarray:
+    """The ground in quieter colours: most real ones are."""
+    grey = canvas.mean(axis=2, keepdims=True)
+    return grey + float(random.uniform(0.25, 0.9)) * (canvas - grey)
+
+
+def add_plates(canvas: np.ndarray, view: View, plates: Sequence[Plate], random: Random) -> None:
+    """Paint plates of one kind onto the plane, in colours that differ from the ground's."""
+    base = _colour_apart(random, canvas.mean(axis=(0, 1)), least=15)
+    tones = [base if step % 2 == 0 else base * random.uniform(0.7, 1.25) for step in range(8)]
+    ink = base * random.choice([0.45, 1.5])
+    for plate in plates:
+        _add_plate(canvas, view, plate, np.clip(tones, 0, 1), np.clip(ink, 0, 1))
+
+
+def _add_plate(canvas: np.ndarray, view: View, plate: Plate, tones: np.ndarray, ink: np.ndarray) -> None:
     x, y, pixel = _plane(view)
     x, y = x - plate.center[0], y - plate.center[1]
     radius = np.hypot(x, y)
-    tone = base
-    for step, edge in enumerate(plate.edges):
-        cover = np.clip(0.5 + (edge - radius) / np.maximum(pixel, 1e-6), 0, 1)[..., None]
-        if step:
-            tone = np.clip(base * random.uniform(0.7, 1.25), 0, 1) if step % 2 else base
-        canvas += cover * (tone.astype(np.float32) - canvas)
+    for edge, tone in zip(plate.edges, tones, strict=False):
+        cover = np.clip(0.5 + (edge - radius) / pixel, 0, 1)[..., None]
+        canvas += (cover * (tone - canvas)).astype(np.float32)
     if plate.spokes:
-        angle = np.degrees(np.arctan2(y, x)) - plate.spoke_phase_deg
         step_deg = 360 / plate.spokes
+        angle = np.degrees(np.arctan2(y, x)) - plate.spoke_phase_deg
         away = np.radians(np.abs((angle + step_deg / 2) % step_deg - step_deg / 2)) * radius
         wide = 0.006 * plate.edges[0] + 0.25
-        cover = np.clip(0.5 + (wide - away) / np.maximum(pixel, 1e-6), 0, 1)
+        cover = np.clip(0.5 + (wide - away) / pixel, 0, 1)
         cover *= (radius < plate.edges[0]) & (radius > plate.edges[-1])
-        ink = np.clip(base * random.choice([0.45, 1.5]), 0, 1).astype(np.float32)
-        canvas += cover[..., None] * (ink - canvas)
+        canvas += (cover[..., None] * (ink - canvas)).astype(np.float32)
 
 
 def add_patches(canvas: np.ndarray, random: Random, count: int) -> None:
@@ -58,12 +68,9 @@ def add_obstacle(canvas: np.ndarray, random: Random, center_px: np.ndarray, reac
     return _add_patch(canvas, random, center_px, reach_px / max(canvas.shape[:2]))
 
 
-def _add_patch(
-    canvas: np.ndarray, random: Random, center_px: np.ndarray | None, share: float
-) -> np.ndarray:
+def _add_patch(canvas: np.ndarray, random: Random, center_px: np.ndarray | None, share: float) -> np.ndarray:
     height, width = canvas.shape[:2]
-    if center_px is None:
-        center_px = random.uniform((0, 0), (width, height))
+    middle = random.uniform((0, 0), (width, height)) if center_px is None else center_px
     reach = share * max(height, width)
     turn, squeeze = random.uniform(0, 2 * np.pi), random.uniform(0.5, 1)
     corners = int(random.choice([3, 4, 4, 40]))
@@ -71,7 +78,7 @@ def _add_patch(
     outline = np.column_stack([np.cos(angles), squeeze * np.sin(angles)]) * reach
     lean = random.uniform(0, np.pi)
     axes = np.array([[np.cos(lean), np.sin(lean)], [-np.sin(lean), np.cos(lean)]])
-    points = np.rint((center_px + outline @ axes) * 16).astype(np.int32)
+    points = np.rint((middle + outline @ axes) * 16).astype(np.int32)
     mask = np.zeros((height, width), np.float32)
     cv2.fillPoly(mask, [points], 1.0, cv2.LINE_AA, 4)
     cover = mask[..., None]
@@ -80,8 +87,8 @@ def _add_patch(
     return mask > 0.5
 
 
-def shine(canvas: np.ndarray, random: Random) -> np.ndarray:
-    """A gradient of light over the picture."""
+def shone_on(canvas: np.ndarray, random: Random) -> np.ndarray:
+    """The picture under light that changes across it."""
     height, width = canvas.shape[:2]
     light = 1 + random.uniform(-0.25, 0.25) * np.linspace(-1, 1, width)[None, :, None]
     light = light + random.uniform(-0.25, 0.25) * np.linspace(-1, 1, height)[:, None, None]
@@ -91,7 +98,7 @@ def shine(canvas: np.ndarray, random: Random) -> np.ndarray:
 def photographed(
     canvas: np.ndarray, random: Random, *, noise: float, squeezed: bool
 ) -> tuple[np.ndarray, bytes | None]:
-    """The picture as a camera gives it: blurred, noisy, 8 bits; uint8 [H, W, 3], and its JPEG if `squeezed`."""
+    """The picture as a camera gives it: blurred, noisy, uint8 [H, W, 3]; and as JPEG if `squeezed`."""
     canvas = cv2.GaussianBlur(canvas, (0, 0), random.uniform(0.4, 0.9))
     canvas = canvas + random.normal(0, noise, canvas.shape).astype(np.float32)
     pixels = np.rint(np.clip(canvas, 0, 1) * 255).astype(np.uint8)
@@ -123,7 +130,10 @@ def stands_out(look: np.ndarray, ground: np.ndarray, *, least: float) -> bool:
 
 
 def _plane(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x and y of the plane at each pixel, and how wide a pixel is there, all [H, W]; far off beyond the horizon."""
+    """x and y of the plane at each pixel, and how wide a pixel is there, all [H, W].
+
+    Beyond the horizon they are far off.
+    """
     matrix = np.linalg.inv(view.canvas_from_plane)
     columns, rows = np.arange(view.size.width)[None, :], np.arange(view.size.height)[:, None]
     x, y, depth = (part[0] * columns + part[1] * rows + part[2] for part in matrix)
@@ -135,12 +145,9 @@ def _plane(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return x, y, np.clip(np.sqrt(across * down), 1e-6, 10).astype(np.float32)
 
 
-def colours_apart(random: Random, others: Sequence[np.ndarray], *, least: float) -> np.ndarray:
-    """A colour that differs from `others` (RGB [3]) by `least` in Lab, or the best of many tries."""
-    tries = [random_colour(random) for _ in range(12)]
-    ground = lab(np.array(others))
-    distances = [float(np.linalg.norm(lab(one[None]) - ground, axis=1).min()) for one in tries]
-    for one, distance in zip(tries, distances, strict=True):
-        if distance >= least:
-            return one
-    return tries[int(np.argmax(distances))]
+def _colour_apart(random: Random, other: np.ndarray, *, least: float) -> np.ndarray:
+    """A colour that differs from `other` (RGB [3]) by `least` in Lab, or the best of some tries."""
+    tries = np.array([random_colour(random) for _ in range(12)])
+    apart = np.linalg.norm(lab(tries) - lab(other[None]), axis=1)
+    enough = np.flatnonzero(apart >= least)
+    return tries[enough[0] if len(enough) else int(apart.argmax())]
