@@ -64,7 +64,7 @@ def _concentric(random: Random) -> RingLayout:
 def _fan(random: Random) -> RingLayout:
     """Table 1's count: ring i has `count*i` objects at one step, so the arcs get longer with i."""
     rings = int(random.choice([2, 3, 3, 4, 4]))
-    count = int(random.integers(3, 8)) if rings > 2 else int(random.integers(5, 8))
+    count = int(random.integers(4, 8)) if rings > 2 else int(random.integers(5, 9))
     first = 2 if rings == 3 and random.random() < 0.4 else 1
     last = first + rings - 1
     # A whole part of the circle that the longest arc fills, or nearly.

@@ -13,7 +13,7 @@ from p3i.interp.unroll import points
 from p3i.paint.sprite import lay
 from p3i.search.result import StructureFound
 
-_CONTRAST = 28.0
+_CONTRAST = 32.0
 """How far the colour of an object lies from that below it, in Lab."""
 
 

@@ -16,7 +16,7 @@ from p3i.size import Size
 STRAY = 0.004
 """How far objects stray from their places, as a share of their distance (the standard deviation)."""
 
-_NARROW_PX = 9.0
+_NARROW_PX = 10.0
 """The least width of a sprite on the picture; its object fills most of it, so 7 pixels or more."""
 
 _APART_PX = 14.0
@@ -34,9 +34,9 @@ class RingOptions:
     """What scenes with rings are made of.
 
     `jitter` (0..1) is how much objects differ, `noise` that of the pixels, `clutter` how many things at most
-    lie about, `hidden` the largest share of objects that are left out or covered, `plates` the share of scenes
-    with a plate below the objects, `jpeg` that of scenes squeezed as JPEG. `size` None draws one from 480 to
-    900 pixels. `focals` gives a third of the scenes another lens (24 to 60 mm) than that of `focal_mm`.
+    lie about, `hidden` the largest share of objects that are left out or covered, `plates` the share of
+    scenes with a plate below the objects, `jpeg` that of scenes squeezed as JPEG. `size` None draws one from
+    480 to 900 pixels. `focals` gives a third of the scenes another lens (24 to 60 mm) than `focal_mm`.
     """
 
     size: Size | None = None

@@ -106,7 +106,9 @@ def photographed(
         return pixels, None
     quality = int(random.integers(60, 93))
     _, packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return np.ascontiguousarray(cv2.imdecode(packed, cv2.IMREAD_COLOR)[..., ::-1]), packed.tobytes()
+    read = cv2.imdecode(packed, cv2.IMREAD_COLOR)
+    assert read is not None
+    return np.ascontiguousarray(read[..., ::-1]), packed.tobytes()
 
 
 def beneath(canvas: np.ndarray, places_px: np.ndarray) -> np.ndarray:
