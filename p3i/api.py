@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from p3i.vision.image import Image
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand",
+    "synth", "render", "score", "check", "format", "expand", "examples",
     "load", "loads", "dump", "dumps", "read_image",
 ]  # fmt: skip
 
@@ -118,6 +118,35 @@ def render(
     return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
 
 
+def examples(
+    folder: str | os.PathLike[str],
+    *,
+    seed: int = 0,
+    lattices: int = 4,
+    rings: int = 4,
+    hybrids: int = 4,
+    focals: bool = False,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Path, ...]:
+    """Draw scenes with known truth into `folder`: images/, programs/ and annotations.json (docs/examples.md).
+
+    Returns the paths of the pictures. The same arguments write the same bytes. `focals` gives a third of the
+    rings another lens than 35 mm. Raises UsageError for counts out of range, FileError where a file of the
+    set exists already (without `force`) or cannot be written.
+    """
+    from p3i.evaluation.example_set import write_examples
+
+    return write_examples(
+        Path(folder),
+        {"lattice": lattices, "circular": rings, "hybrid": hybrids},
+        seed=seed,
+        focals=focals,
+        force=force,
+        progress=progress,
+    )
+
+
 def _without(
     image: "Image", *, mask: "str | os.PathLike[str] | np.ndarray | None", roi: Polygon | None
 ) -> "Image":
@@ -176,6 +205,7 @@ def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) ->
         header = Header(
             canvas=(size.width, size.height),
             focal_mm=answer.focal_mm,
+            lens_k1=result.lens_k1,
             image=name,
             fit=tuple(facts.items()),
         )

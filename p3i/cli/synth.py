@@ -19,18 +19,27 @@ from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, senten
 from p3i.search.result import StopReason, SynthesisResult
 
 
-class FocalType(click.ParamType):
-    """A focal length in mm, or the word auto."""
+class NumberOrWord(click.ParamType):
+    """A number that is `what`, or one of the words, each of which means a value."""
 
-    name = "MM|auto"
+    def __init__(self, unit: str, what: str, words: Mapping[str, str | None]) -> None:
+        self.name = "|".join((unit, *words))
+        self.what, self.words = what, words
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
-        if str(value).strip().lower() == "auto":
-            return "auto"
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | str | None:
+        word = str(value).strip().lower()
+        if word in self.words:
+            return self.words[word]
         try:
             return float(value)
         except ValueError:
-            self.fail(f"{value!r} is neither a focal length in mm nor auto", param, ctx)
+            self.fail(f"{value!r} is neither {self.what} nor {' nor '.join(self.words)}", param, ctx)
+
+
+FOCAL = NumberOrWord("MM", "a focal length in mm", {"auto": "auto"})
+LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 
 
 @click.command("synth", short_help="Find the camera and the program of a photo's pattern.")
@@ -64,7 +73,8 @@ class FocalType(click.ParamType):
     metavar="X,Y,W,H|POINTS",
     help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
 )
-@click.option("--focal", "focal_mm", type=FocalType(), metavar="MM|auto", help=sentence("focal_mm"))
+@click.option("--focal", "focal_mm", type=FOCAL, metavar=FOCAL.name, help=sentence("focal_mm"))
+@click.option("--lens", type=LENS, metavar=LENS.name, help=sentence("lens"))
 @search_options.features
 @search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))

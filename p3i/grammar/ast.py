@@ -123,9 +123,9 @@ class Header:
     """The optional TOML block in comments; what it does not say is None.
 
     `canvas` is (width, height) in pixels, `focal_mm` the 35 mm-equivalent focal of docs/geometry.md,
-    `image` a path relative to the program, `fit` the facts that `synth` wrote down, in order. `lines` is
-    the block as it was written, which the printer repeats as long as it says the same as the fields;
-    `comments` stand above the block.
+    `image` a path relative to the program, `fit` the facts that `synth` wrote down, in order, `lens_k1` the
+    radial distortion of the photo (docs/geometry.md). `lines` is the block as it was written, which the
+    printer repeats as long as it says the same as the fields; `comments` stand above the block.
     """
 
     version: int = 1
@@ -133,6 +133,7 @@ class Header:
     focal_mm: float | None = None
     image: str | None = None
     fit: tuple[tuple[str, FitValue], ...] = ()
+    lens_k1: float | None = None
     lines: tuple[str, ...] = field(default=(), compare=False, repr=False)
     comments: tuple[str, ...] = field(default=(), compare=False, repr=False)
 

@@ -72,7 +72,7 @@ def read_header(comments: Sequence[Comment], *, first_statement: int) -> HeaderR
     above = tuple(comment.text for comment in comments[:start])
     if header is not None:
         header = Header(
-            header.version, header.canvas, header.focal_mm, header.image, header.fit,
+            header.version, header.canvas, header.focal_mm, header.image, header.fit, header.lens_k1,
             lines=tuple(comment.text for comment in block), comments=above,
         )  # fmt: skip
     return HeaderReading(header, tuple(comments[end + 1 :]), (*problems, *found, *more))
@@ -87,6 +87,8 @@ def header_lines(header: Header) -> tuple[str, ...]:
         lines.append(f"canvas = [{header.canvas[0]}, {header.canvas[1]}]")
     if header.focal_mm is not None:
         lines.append(f"focal = {_toml(header.focal_mm)}")
+    if header.lens_k1 is not None:
+        lines.append(f"lens_k1 = {_toml(header.lens_k1)}")
     if header.image is not None:
         lines.append(f"image = {_toml(header.image)}")
     if header.fit:
@@ -152,6 +154,9 @@ def _header(values: dict[str, Any], block: Sequence[Comment]) -> tuple[Header | 
     focal: Any = values.get("focal")
     if focal is not None and not (_is_number(focal) and focal > 0):
         refuse("focal", "a positive number of millimetres, as in `focal = 35.0`")
+    lens_k1: Any = values.get("lens_k1")
+    if lens_k1 is not None and not (_is_number(lens_k1) and abs(lens_k1) < 0.4):
+        refuse("lens_k1", "a number between -0.4 and 0.4, as in `lens_k1 = -0.08`")
     image: Any = values.get("image")
     if image is not None and not (isinstance(image, str) and image and "\0" not in image):
         refuse("image", 'a path in quotes, as in `image = "tiles.jpg"`')
@@ -160,7 +165,7 @@ def _header(values: dict[str, Any], block: Sequence[Comment]) -> tuple[Header | 
         refuse("fit", "a table of numbers, texts, true and false")
     if problems:
         return None, tuple(problems)
-    known = {"version", "canvas", "focal", "image", "fit"}
+    known = {"version", "canvas", "focal", "lens_k1", "image", "fit"}
     strangers = tuple(
         warning(
             "P119",
@@ -172,7 +177,8 @@ def _header(values: dict[str, Any], block: Sequence[Comment]) -> tuple[Header | 
         if key not in known
     )
     facts = cast(dict[str, FitValue], fit)
-    return Header(1, tuple(canvas) if canvas else None, focal, image, tuple(facts.items())), strangers
+    size = tuple(canvas) if canvas else None
+    return Header(1, size, focal, image, tuple(facts.items()), lens_k1), strangers
 
 
 def _is_number(value: object) -> bool:

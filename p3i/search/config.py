@@ -16,6 +16,9 @@ Structure = Literal["auto", "lattice"]
 Extent = Literal["found", "image"]
 
 STRUCTURES: tuple[Structure, ...] = ("auto", "lattice")
+MOST_K1 = 0.4
+"""Beyond this radial distortion no photo lens goes (p3i/interp/lens.py)."""
+
 DEVICES: tuple[str, ...] = ("auto", "cpu")
 EXTENTS: tuple[Extent, ...] = ("found", "image")
 FEATURES: tuple[str, ...] = ("oriented", "rgb", "lite0", "alexnet")
@@ -39,6 +42,10 @@ class SearchConfig:
         float | Literal["auto"] | None,
         "35 mm-equivalent focal length, or auto: estimated from the pattern where that fixes it. "
         "By default that of the photo's EXIF data, else 35.",
+    ] = None
+    lens: Annotated[
+        float | Literal["auto"] | None,
+        "Radial lens distortion k1 (below 0: barrel), or auto: estimated from the pattern. By default none.",
     ] = None
     extent: Annotated[
         Extent, "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
@@ -69,6 +76,10 @@ class SearchConfig:
             math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000
         ):
             raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        if isinstance(self.lens, str):
+            _one_of("the lens, where no number,", self.lens, ("auto",))
+        elif self.lens is not None and not abs(self.lens) < MOST_K1:
+            raise UsageError(f"k1 of a lens lies between -{MOST_K1} and {MOST_K1}, not {self.lens:g}")
         if self.time_s is not None and not self.time_s > 0:
             raise UsageError(f"the time must be more than 0 seconds, not {self.time_s:g}")
         if self.top < 1:

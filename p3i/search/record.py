@@ -31,12 +31,15 @@ def answer_record(result: SynthesisResult, *, image: str, seconds: float) -> dic
             "focal_reason": result.focal_reason,
         },
         "centers": [[round(x, 2), round(y, 2), i, j] for x, y, i, j in result.centers],
+        "region": [[round(x, 1), round(y, 1)] for x, y in result.region],
         "score": _rounded(result.score),
         "margin": _rounded(result.margin),
         "seconds": round(seconds, 3),
         "features": result.features,
         "seed": result.seed,
     }
+    if result.lens_k1 is not None:
+        record["camera"]["lens_k1"] = result.lens_k1
     if len(result.candidates) > 1:
         record["candidates"] = [_candidate_record(candidate) for candidate in result.candidates]
     return record

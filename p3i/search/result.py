@@ -64,6 +64,9 @@ class SynthesisResult:
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
     why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at
     most `SearchConfig.top`.
+    `lens_k1` is the radial distortion of the photo that `program` holds on (docs/geometry.md), None where it
+    was seen as a pinhole camera's; `centers` lie on the photo as it is. `region` is the part of the photo
+    where the program holds: a convex polygon around the cells of its objects, (x, y) in pixels.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
     """
 
@@ -78,6 +81,8 @@ class SynthesisResult:
     focal_mm: float = 35.0
     focal_source: FocalSource = "default"
     focal_reason: str = ""
+    lens_k1: float | None = None
+    region: tuple[tuple[float, float], ...] = ()
     features: str = ""
     seed: int = 0
     notes: tuple[str, ...] = ()

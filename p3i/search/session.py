@@ -63,7 +63,8 @@ class Answer:
 
     `score` says how sure it is (0..1, comparable between photos), `worth` how much of this photo it explains
     (comparable between programs for one photo). `focal_mm` is the focal that the program is told with, None
-    where it is the one assumed; then `focal_reason` may say why no other was found.
+    where it is the one assumed; then `focal_reason` may say why no other was found. `lens_k1` is the radial
+    distortion of the photo that the program holds on (p3i/interp/lens.py), None for a pinhole camera.
     """
 
     program: Program
@@ -73,3 +74,4 @@ class Answer:
     notes: tuple[str, ...] = ()
     focal_mm: float | None = None
     focal_reason: str = ""
+    lens_k1: float | None = None

@@ -1,13 +1,12 @@
 """Photo -> program: the whole search, from what may be looked at to the answer or the reason for none."""
 
 import numpy as np
-import torch
 
 from p3i.grammar.ast import Program
-from p3i.interp import unroll
-from p3i.interp.camera import Camera, project
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence
+from p3i.search.lens import find_with_lens
+from p3i.search.region import centers_px, region_px
 from p3i.search.result import (
     FOCAL_REASONS,
     NEEDED,
@@ -20,7 +19,6 @@ from p3i.search.session import Answer, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
-from p3i.vision.warp import in_frame
 
 # Pictures below this many pixels a side, or with less than this share known, are not searched.
 _LEAST_SIDE = 32
@@ -53,14 +51,7 @@ def synthesize(
     if hopeless is not None:
         return result(None, hopeless)
     session = Session(Evidence(image, config, focal_mm), config, progress, trace)
-    answers: list[Answer] = []
-    try:
-        for family in FAMILIES:
-            if config.structure in ("auto", family.structure):
-                answers += family.find(session)
-    except KeyboardInterrupt:
-        session.stopped = StopReason.INTERRUPTED
-    answers.sort(key=lambda answer: -answer.worth)
+    answers = _found(session) if config.lens is None else find_with_lens(session, _found)
     good = [answer for answer in answers if answer.score >= NEEDED]
     if not good:
         best = max((answer.score for answer in answers), default=0.0)
@@ -84,10 +75,24 @@ def synthesize(
             )
             for answer in good[: config.top]
         ),
-        centers=centers_px(first.program, image, first.focal_mm or focal_mm),
+        centers=centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
+        region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
+        lens_k1=first.lens_k1,
         notes=first.notes,
         **_focal_facts(first, assumed),
     )
+
+
+def _found(session: Session) -> list[Answer]:
+    """What every family that is asked for finds, the most worth first; an interrupt ends the search."""
+    answers: list[Answer] = []
+    try:
+        for family in FAMILIES:
+            if session.config.structure in ("auto", family.structure):
+                answers += family.find(session)
+    except KeyboardInterrupt:
+        session.stopped = StopReason.INTERRUPTED
+    return sorted(answers, key=lambda answer: -answer.worth)
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
@@ -106,22 +111,6 @@ def _focal_facts(answer: Answer | None, assumed: tuple[float, FocalSource]) -> d
         mm, source = answer.focal_mm, "pattern"
     reason = answer.focal_reason if answer is not None else ""
     return {"focal_mm": mm, "focal_source": source, "focal_reason": reason or FOCAL_REASONS[source]}
-
-
-def centers_px(program: Program, image: Image, focal_mm: float) -> tuple[tuple[float, float, int, int], ...]:
-    """The program's objects on the photo: (x, y) in pixels and (i, j); those outside the frame left out."""
-    points = unroll.points(program)
-    if not points:
-        return ()
-    camera = Camera.of(program, focal_mm=focal_mm)
-    plane = torch.tensor([point[:2] for point in points], dtype=torch.float64)
-    pixels, in_front = project(camera.image_from_plane(image.size), plane)
-    inside = in_front & in_frame(pixels, image.size)
-    return tuple(
-        (float(pixels[place, 0]), float(pixels[place, 1]), *points[place][2:])
-        for place in unroll.distinct(points)
-        if bool(inside[place])
-    )
 
 
 def _hopeless(image: Image) -> StopReason | None:

@@ -84,6 +84,23 @@ def warp_pixels(pixels: np.ndarray, source_from_target: np.ndarray, size: Size) 
     )
 
 
+def remapped(pixels: np.ndarray, valid: np.ndarray, points_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A picture read at points, for maps that are no homography: the pixels, and which of them are known.
+
+    Shapes: pixels [H, W, C] float32, valid [H, W] bool, points_px [h, w, 2] (x, y) -> [h, w, C], [h, w] bool.
+    Points beyond the outermost pixel centres read the nearest pixel and are unknown. OpenCV rounds points to
+    1/32 pixel.
+    """
+    x, y = (np.ascontiguousarray(points_px[..., axis], dtype=np.float32) for axis in (0, 1))
+    values = cv2.remap(pixels, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    height, width = valid.shape
+    known = (x >= -1e-3) & (x <= width - 1 + 1e-3) & (y >= -1e-3) & (y <= height - 1 + 1e-3)
+    if not valid.all():
+        whole = cv2.remap(valid.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        known &= whole >= _WHOLE
+    return values, known
+
+
 def pixel_grid(
     size: Size, *, dtype: torch.dtype = torch.float32, device: torch.device | None = None
 ) -> Tensor:

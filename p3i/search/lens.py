@@ -1,0 +1,241 @@
+"""Radial lens distortion, estimated from the pattern: k1 of p3i/interp/lens.py.
+
+A lens bends the rows of a lattice and makes an egg of a ring, which no camera pose can. So where the objects
+really lie, against where the program puts them, tells k1 together with all of the program's numbers. The
+search itself knows of pinhole cameras only: it looks at the photo straightened of its lens, on a canvas wide
+enough for all that the photo shows, and its programs are put back onto the photo's canvas.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+
+from p3i.grammar.ast import Program
+from p3i.grammar.leaves import with_leaves
+from p3i.interp.camera import project
+from p3i.interp.compile import compile
+from p3i.interp.lens import photo_from_straight
+from p3i.interp.pattern import Pattern, moving_leaves
+from p3i.search.config import MOST_K1
+from p3i.search.evidence import Evidence
+from p3i.search.patches import find_objects, frames, spacing
+from p3i.search.refine import free_numbers
+from p3i.search.register import robust_fit
+from p3i.search.session import Answer, Session
+from p3i.size import Size
+from p3i.vision.image import Image
+from p3i.vision.warp import in_frame, pixel_grid, remapped
+
+# A straightened canvas is at most so much wider than the photo: what a barrel lens saw beyond is given up.
+_WIDEST = 1.4
+# An object's place is known to this share of the spacing, and no better than this many photo pixels.
+_SHARE_NOISE, _PIXEL_NOISE = 0.03, 0.3
+# k1 before anything is known: none, give or take this.
+_PRIOR_SPREAD = 0.2
+# A lens is believed in where k1 is so many times its own uncertainty, and not too small to matter.
+_SIGMAS, _LEAST_K1 = 4.0, 0.015
+# Two estimates this close are one.
+_CONVERGED = 0.01
+_MOST_OBJECTS = 300
+_FEWEST_OBJECTS = 12
+_ROUNDS = 3
+# Numbers of a program are rounded as in objects.py.
+_LENGTH_DIGITS = 4
+_K1_DIGITS = 4
+# A fit that runs away ends within what the options take.
+_MOST = 0.95 * MOST_K1
+
+Search = Callable[[Session], list[Answer]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Straightened:
+    """A photo freed of its lens: `image` on a canvas `scale` times as wide as `photo_size`."""
+
+    image: Image
+    photo_size: Size
+    k1: float
+    scale: float
+
+    def on_photo(self, answer: Answer) -> Answer:
+        """An answer found on `image`, in units of the photo's canvas, with its k1."""
+        focal_mm = None if answer.focal_mm is None else answer.focal_mm * self.scale
+        program = scaled(answer.program, self.scale)
+        return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=self.k1)
+
+
+@dataclass(frozen=True, slots=True)
+class LensFit:
+    """k1 as the objects tell it, its standard deviation, and from how many objects."""
+
+    k1: float
+    spread: float
+    objects: int
+
+    @property
+    def certain(self) -> bool:
+        """Whether there is a lens worth correcting."""
+        return abs(self.k1) > max(_SIGMAS * self.spread, _LEAST_K1)
+
+
+def straightened(image: Image, k1: float) -> Straightened:
+    """The photo as a pinhole camera of the same focal would show it; what it does not show is unknown."""
+    size = image.size
+    if k1 == 0:
+        return Straightened(image, size, k1, 1.0)
+    widen = min(_WIDEST, max(1.0, 1 / (1 + k1)))
+    margin = math.ceil((widen - 1) / 2 * size.longer)
+    # As many pixels on each side keep the middle; the longer side must remain the longer.
+    canvas = Size(size.width + 2 * margin, size.height + 2 * margin)
+    straight = pixel_grid(canvas, dtype=torch.float32) - margin
+    points, shown = photo_from_straight(straight, k1, size=size)
+    pixels, valid = remapped(image.pixels, image.valid, points.numpy())
+    straight_image = dataclasses.replace(image, pixels=pixels, valid=valid & shown.numpy())
+    return Straightened(straight_image, size, k1, canvas.longer / size.longer)
+
+
+def scaled(program: Program, factor: float) -> Program:
+    """The program with all lengths times `factor`; angles and loops stay."""
+    if factor == 1:
+        return program
+    lengths = {
+        path: round(value * factor, _LENGTH_DIGITS)
+        for path, value in moving_leaves(program).items()
+        if path.startswith("draw.") and ".angle." not in path
+    }
+    return with_leaves(program, lengths)
+
+
+def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit | None:
+    """k1 from the objects of an answer that was found on `seen`; None where they are too few.
+
+    All numbers of the program and k1 are fitted together, to places on the photo as it was taken.
+    """
+    pattern = compile(answer.program)
+    focal_mm = answer.focal_mm or evidence.focal_mm
+    canvas = evidence.image.size
+    theta, index = pattern.theta, pattern.index.double()
+    matrix = pattern.image_from_plane(size=canvas, focal_mm=focal_mm)
+    points, in_front = project(matrix, pattern.points_at(index))
+    index = index[in_front & in_frame(points, canvas)]
+    index = index[:: len(index) // _MOST_OBJECTS + 1]
+    if len(index) < _FEWEST_OBJECTS:
+        return None
+    side = spacing(pattern, theta)
+    found = find_objects(
+        evidence, pattern, theta, index, torch.ones(len(index)), side=side, focal_mm=focal_mm
+    )
+    # Once more, with a mean of the objects that were seen.
+    found = find_objects(evidence, pattern, theta, index, found.certainty, side=side, focal_mm=focal_mm)
+    weights = found.certainty
+    if int((weights > 0).sum()) < _FEWEST_OBJECTS:
+        return None
+    index, offsets, weights = index[weights > 0], found.offsets[weights > 0], weights[weights > 0].double()
+    plane = frames(pattern, theta, index, side=side).points(offsets[:, None])[:, 0]
+    straight, _ = project(matrix, plane)
+    targets, _ = photo_from_straight(
+        _shifted(straight, canvas, seen.photo_size), seen.k1, size=seen.photo_size
+    )
+    cell_px = _spacing_px(pattern, index, matrix, side)
+    noise = (_PIXEL_NOISE**2 + (_SHARE_NOISE * cell_px) ** 2).sqrt()
+    free = free_numbers(pattern, theta)
+    places = torch.tensor(free.places)
+
+    def points_of(moving: torch.Tensor) -> torch.Tensor:
+        numbers = theta.index_put((places,), moving[:-1])
+        at = pattern.image_from_plane(numbers, size=canvas, focal_mm=focal_mm)
+        straight, _ = project(at, pattern.points_at(index, numbers))
+        return photo_from_straight(
+            _shifted(straight, canvas, seen.photo_size), moving[-1], size=seen.photo_size
+        )[0]
+
+    start = torch.cat([theta[places], torch.tensor([seen.k1], dtype=torch.float64)])
+    prior = torch.zeros(len(start), 2, dtype=torch.float64)
+    prior[-1, 1] = 1 / _PRIOR_SPREAD**2
+    whiten = torch.eye(2, dtype=torch.float64) / noise[:, None, None]
+    moved = robust_fit(
+        points_of,
+        start,
+        targets=targets,
+        whiten=whiten,
+        weights=weights,
+        limits=torch.tensor([*free.limits, 0.05], dtype=torch.float64),
+        prior=prior,
+        iterations=15,
+    )
+    return LensFit(float(moved[-1]), _spread(points_of, moved, targets, noise), len(index))
+
+
+def find_with_lens(session: Session, search: Search) -> list[Answer]:
+    """What `search` finds on the photo freed of its lens, in units of the photo's canvas, the best first.
+
+    A lens that the options state is taken as it is. One that is to be estimated is, from the first answer on
+    the photo as it is; then the photo is straightened and searched again until k1 stays. That is kept only
+    where the score has gained, and where no lens shows the answers are those on the photo as it is.
+    """
+    given = session.config.lens
+    image = session.evidence.image
+    if isinstance(given, float | int):
+        seen = straightened(image, given)
+        return [seen.on_photo(answer) for answer in _searched(seen, session, search)[0]]
+    plain = found = best = search(session)
+    seen, evidence = straightened(image, 0.0), session.evidence
+    for _ in range(_ROUNDS):
+        if not found or not session.go_on():
+            break
+        session.tell("estimating the lens", 0.9)
+        told = estimated(evidence, seen, found[0])
+        if told is None or abs(told.k1 - seen.k1) < _CONVERGED or (best is plain and not told.certain):
+            break
+        session.record("lens", k1=told.k1, spread=told.spread, objects=told.objects)
+        seen = straightened(image, round(max(-_MOST, min(_MOST, told.k1)), _K1_DIGITS))
+        found, evidence = _searched(seen, session, search)
+        if not found or (best and found[0].score < best[0].score):
+            break
+        note = f"lens: k1 = {seen.k1:.3f} +- {told.spread:.3f}, from {told.objects} objects"
+        best = [dataclasses.replace(seen.on_photo(one), notes=(*one.notes, note)) for one in found]
+    return best
+
+
+def _searched(seen: Straightened, session: Session, search: Search) -> tuple[list[Answer], Evidence]:
+    """The answers on a straightened photo, in units of its own canvas, and what was looked at."""
+    evidence = Evidence(seen.image, session.config, session.evidence.focal_mm / seen.scale)
+    again = dataclasses.replace(session, evidence=evidence)
+    found = search(again)
+    session.stopped = again.stopped
+    return found, evidence
+
+
+def _shifted(points_px: torch.Tensor, canvas: Size, photo: Size) -> torch.Tensor:
+    """Points on the straightened canvas as points on the photo's, which has the same middle."""
+    return points_px - points_px.new_tensor(canvas.middle) + points_px.new_tensor(photo.middle)
+
+
+def _spacing_px(pattern: Pattern, index: torch.Tensor, matrix: torch.Tensor, side: float) -> torch.Tensor:
+    """The spacing about each object in pixels [N]: the root of the area that its patch covers."""
+    where = frames(pattern, pattern.theta, index, side=side)
+    corners = [project(matrix, where.origin + 0.1 * axis)[0] for axis in (where.along, where.across)]
+    middle, _ = project(matrix, where.origin)
+    a, b = ((corner - middle) / 0.1 for corner in corners)
+    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).abs().sqrt()
+
+
+def _spread(
+    points_of: Callable[[torch.Tensor], torch.Tensor],
+    numbers: torch.Tensor,
+    targets: torch.Tensor,
+    noise: torch.Tensor,
+) -> float:
+    """The standard deviation of the last of the fitted numbers, by what is left of the residuals."""
+    jacobian = torch.func.jacfwd(points_of)(numbers) / noise[:, None, None]
+    left = ((points_of(numbers) - targets) / noise[:, None]).square().sum(1)
+    rows = jacobian.reshape(-1, len(numbers))
+    scale = rows.norm(dim=0).clamp(min=1e-9)
+    normal = (rows / scale).T @ (rows / scale)
+    inverse = torch.linalg.pinv(normal + 1e-9 * torch.eye(len(numbers), dtype=rows.dtype))
+    # Half the median of a chi-square of two degrees is ln 2: strays do not widen the spread.
+    variance = float(left.median()) / (2 * math.log(2))
+    return math.sqrt(max(float(inverse[-1, -1]), 0.0) * variance) / float(scale[-1])
