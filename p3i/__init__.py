@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from p3i.api import read_image, render, score, synth
+    from p3i.api import examples, read_image, render, score, synth
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
@@ -38,6 +38,7 @@ _HOMES = {
     "check": "p3i.language",
     "dump": "p3i.language",
     "dumps": "p3i.language",
+    "examples": "p3i.api",
     "expand": "p3i.language",
     "format": "p3i.language",
     "load": "p3i.language",
@@ -49,7 +50,7 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand",
+    "synth", "render", "score", "check", "format", "expand", "examples",
     "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",

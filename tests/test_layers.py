@@ -23,9 +23,9 @@ ALLOWED: dict[str, set[str]] = {
     PAINT: {GRAMMAR, INTERP, VISION},
     # The torch-free functions of the API: what `p3i check` runs.
     "p3i.language": {GRAMMAR, INTERP},
-    "p3i.api": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language"},
+    "p3i.evaluation": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language"},
+    "p3i.api": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.evaluation"},
     "p3i.cli": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
-    "p3i.evaluation": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
     # The package itself re-exports lazily, and imports nothing.
     "p3i": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
 }

@@ -32,6 +32,7 @@ COMMANDS: dict[str, Entry] = {
     "fmt": Entry("p3i.cli.fmt", "Rewrite programs in their canonical text."),
     "expand": Entry("p3i.cli.expand", "List the objects that a program draws."),
     "score": Entry("p3i.cli.score", "Say how well a program explains a photo."),
+    "examples": Entry("p3i.cli.examples", "Draw scenes whose program is known, as a set to measure with."),
 }
 """In the order of `p3i --help`: the main job first."""
 
