@@ -123,7 +123,7 @@ def _climbed(
 
 
 def _descended(maps: PointMaps, filling: Filling, z: Tensor) -> Tensor:
-    """z [K, F] after gradient descent (Adam) on the points' score, from blurred to sharp, within the limits."""
+    """z [K, F] after gradient descent (Adam) on the score, from blurred to sharp, within the limits."""
     width = filling.width
     first, second = torch.zeros_like(z), torch.zeros_like(z)
     for step in range(1, _DESCENTS + 1):

@@ -2,8 +2,8 @@
 
 A draw is looked at where its middle falls, on a blurred map, and held against the points half a step away:
 along each loop variable and, where a single loop draws a chain, across it. Where all draws look alike and
-unlike their half steps, a pattern may be. This is equation 2 turned so that a smooth or tiny view gains nothing;
-it costs microseconds a filling, so that a grid over the holes can be afforded, and it is differentiable.
+unlike their half steps, a pattern may be. This is equation 2, turned so that a smooth or tiny view gains
+nothing; it costs microseconds a filling, so that a grid over the holes can be afforded, and has a gradient.
 
 Convention: B fillings z [B, F]; N indices, S settings, C channels; scores [B, S] from about 0 to 1.
 """
@@ -21,6 +21,7 @@ from p3i.search.cells import HALF_STEPS
 from p3i.search.evidence import COARSE, Evidence
 from p3i.search.fill import Filling
 from p3i.search.patches import half_steps
+from p3i.search.ranges import Range
 from p3i.size import Size
 from p3i.vision.normalize import locally_normalized
 from p3i.vision.warp import sample, sample_valid
@@ -208,7 +209,7 @@ def samples(filling: Filling, count: int, generator: torch.Generator) -> Tensor:
     return _from_unit(filling, unit)
 
 
-def _cells(found) -> int:
+def _cells(found: Range) -> int:
     span = found.upper - found.lower
     if found.relative and found.lower > 0:
         return max(1, math.ceil(math.log(found.upper / found.lower) / 0.06))

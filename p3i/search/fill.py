@@ -163,6 +163,12 @@ def with_settings(filling: Filling, settings: tuple[tuple[int, ...], ...]) -> Fi
     return _filling(f.sketch, f.moving, f.counts, f.extents, f.values, settings)
 
 
+def pinned(filling: Filling, z: Tensor, which: Tensor) -> Filling:
+    """The same filling with the numbers `which` bool [F] held where z [F] has them."""
+    held = which.to(z)
+    return replace(filling, base=filling.base + (z * held) @ filling.ties, ties=filling.ties * (1 - held)[:, None])
+
+
 def all_settings(filling: Filling, *, most: int) -> tuple[tuple[int, ...], ...]:
     """Every setting of the extents, evenly thinned out where there are more than `most`."""
     every = tuple(itertools.product(*(u.values() for u in filling.extents)))

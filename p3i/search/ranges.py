@@ -1,4 +1,4 @@
-"""What a hole may be where nobody says: a range, and how finely it is looked through, by the place it stands at.
+"""What a hole may be where nobody says: a range, and how finely it is looked through, by its place.
 
 Lengths are program units, angles degrees. docs/search.md lists the ranges.
 """

@@ -1,0 +1,239 @@
+"""A sketch that a person wrote (or the enumerator) -> programs: grid, climb, registration, extent, score.
+
+No family is known here. The coarse grid looks at single points (coarse.py, climb.py); the best fillings are
+fitted to where their objects really lie (curves.py), the extents are read off which objects are there, and
+numbers that a person bounded stay within their bounds all the way.
+"""
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from p3i.grammar.ast import Polar, Program
+from p3i.grammar.sketch import Sketch
+from p3i.interp.compile import compile
+from p3i.interp.unroll import nest
+from p3i.search.climb import Found, distinct, search_grid
+from p3i.search.coarse import PointMaps, kept_within
+from p3i.search.curves import CurveFit, follow, measured
+from p3i.search.fill import (
+    Filling,
+    all_settings,
+    fillings,
+    pinned,
+    unknowns_of,
+    with_settings,
+)
+from p3i.search.patches import patch_contrast, spacing
+from p3i.search.result import StructureFound
+from p3i.search.score import normalised_score, score_of
+from p3i.search.session import Answer, Session
+from p3i.vision.warp import in_frame
+
+# Points of the grid in all, and at least for each setting of the counts.
+_BUDGET, _LEAST_BUDGET = 60_000, 2_000
+# Objects that a sketch may draw in the coarse search, and settings of its extents there.
+_MOST_INDICES, _MOST_SETTINGS = 64, 8
+# Settings of the extents that are weighed in the end.
+_ALL_SETTINGS = 4000
+# Fillings that are fitted to objects, and rounds of that.
+_FITTED, _ROUNDS, _LAST_ROUNDS = 10, 3, 5
+# An object is worth drawing from this share of the typical contrast on.
+_PRESENT = 0.35
+_SHIFTS = [(1, 0), (-1, 0), (0, 1), (0, -1)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """A fit of one setting of the extents, and that setting."""
+
+    curve: CurveFit
+    setting: tuple[int, ...]
+    worth: float
+
+
+def find_by_sketch(session: Session, sketch: Sketch) -> list[Answer]:
+    """Programs that fill the sketch, the best first; empty where no filling has objects in the photo."""
+    size = session.evidence.image.size
+    canvas = (size.width / size.unit_px, size.height / size.unit_px)
+    unknowns = unknowns_of(sketch, longer_units=canvas)
+    every = list(fillings(sketch, unknowns, most_indices=_MOST_INDICES, most_settings=_MOST_SETTINGS))
+    if not every:
+        return []
+    maps = PointMaps.of(session.evidence)
+    budget = max(_LEAST_BUDGET, _BUDGET // len(every))
+    found: list[Found] = []
+    for place, filling in enumerate(every):
+        if not session.go_on():
+            break
+        session.tell("looking through the holes", 0.7 * place / len(every))
+        found += search_grid(session, maps, filling, budget=budget, keep=_FITTED)
+    found = distinct(maps, sorted(found, key=lambda one: -one.score))[:_FITTED]
+    for one in found:
+        session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
+    answers: list[Answer] = []
+    for place, one in enumerate(found):
+        if answers and not session.go_on():
+            break
+        session.tell("fitting to the objects", 0.7 + 0.3 * place / len(found))
+        fit = _fitted(session, one)
+        if fit is not None:
+            answers.append(_answer(session, fit))
+            session.record("fit", score=answers[-1].score, program=answers[-1].program)
+    return _different(sorted(answers, key=lambda answer: -answer.score))
+
+
+def _fitted(session: Session, found: Found) -> _Fit | None:
+    """A filling fitted to its objects, its extents chosen anew."""
+    evidence = session.evidence
+    setting = found.filling.settings[found.setting]
+    filling = with_settings(found.filling, (setting,))
+    now = _followed(session, filling, found.z, rounds=_ROUNDS)
+    if now is None:
+        return None
+    settings = all_settings(filling, most=_ALL_SETTINGS)
+    wide = with_settings(filling, settings)
+    for _ in range(4):
+        chosen = _best_extent(session, wide, now)
+        if chosen is None or (chosen[1] == setting and torch.equal(chosen[0], now.z)):
+            break
+        z, setting = chosen
+        moved = _followed(session, with_settings(filling, (setting,)), z, rounds=_ROUNDS)
+        if moved is None:
+            break
+        now = moved
+    last = _followed(session, now.filling, now.z, rounds=_LAST_ROUNDS)
+    best = last if last is not None and last.mean >= now.mean else now
+    return _Fit(best, setting, best.mean)
+
+
+def _followed(session: Session, filling: Filling, z: Tensor, *, rounds: int) -> CurveFit | None:
+    """Registration that keeps the limits: a number that leaves its own is held there, the others follow."""
+    evidence = session.evidence
+    fit = measured(evidence, filling, z, focal_mm=evidence.focal_mm)
+    if fit is None or not filling.moving:
+        return fit
+    free = follow(evidence, fit, rounds=rounds)
+    held = torch.zeros(len(z), dtype=torch.bool)
+    for _ in range(len(z)):
+        inside = kept_within(filling, free.z)
+        out = (inside - free.z).abs() > 1e-9
+        if not bool(out.any()):
+            break
+        held |= out
+        start = measured(evidence, pinned(filling, inside, held), inside, focal_mm=evidence.focal_mm)
+        if start is None:
+            break
+        free = follow(evidence, start, rounds=rounds)
+        free = replace(free, z=torch.where(held, inside, free.z))
+    again = measured(evidence, filling, kept_within(filling, free.z), focal_mm=evidence.focal_mm)
+    return again if again is not None and again.mean > fit.mean else fit
+
+
+def _best_extent(session: Session, wide: Filling, now: CurveFit) -> tuple[Tensor, tuple[int, ...]] | None:
+    """Which objects are there: the setting of the extents that draws most of them and little else.
+
+    Where the sketch's numbers allow, its indices are also counted from one object earlier or later.
+    """
+    typical = max(now.mean, 0.05)
+    best: tuple[float, Tensor, tuple[int, ...]] | None = None
+    for shift in [(0, 0), *_SHIFTS]:
+        z = now.z if shift == (0, 0) else _shifted(wide, now.z, shift)
+        if z is None:
+            continue
+        gain = wide.masks.double() @ _gains(session, wide, z, side=now.side, typical=typical)
+        value, place = gain.max(0)
+        if best is None or float(value) > best[0] + 0.5 * typical * (shift != (0, 0)):
+            best = (float(value), z, wide.settings[int(place)])
+    return None if best is None else best[1:]
+
+
+def _gains(session: Session, wide: Filling, z: Tensor, *, side: float, typical: float) -> Tensor:
+    """What drawing each index gains, [N]: its contrast beyond what an object must have; 0 out of sight."""
+    evidence = session.evidence
+    theta = wide.theta(z)
+    points, front = wide.pattern.centers_px(theta, size=evidence.image.size, focal_mm=evidence.focal_mm)
+    seen = front & in_frame(points, evidence.image.size)
+    gains = torch.full((len(seen),), -0.02 * typical, dtype=torch.float64)
+    if int(seen.sum()) >= 3:
+        index = wide.pattern.index[seen].double()
+        found = patch_contrast(
+            evidence, wide.pattern, theta, index, side=side, focal_mm=evidence.focal_mm
+        )
+        gains[seen] = found.contrast.double() - _PRESENT * typical
+    return gains
+
+
+def _shifted(filling: Filling, z: Tensor, shift: tuple[int, int]) -> Tensor | None:
+    """The numbers that draw at (i, j) what z draws at (i, j) + shift; None where the sketch cannot say it."""
+    theta = filling.theta(z)
+    paths = filling.pattern.paths
+    moved = theta.clone()
+    for place, path in enumerate(paths):
+        if path.startswith("draw.") and path.endswith(".1"):
+            kind = path[:-2]
+            for variable, amount in zip(("i", "j"), shift, strict=True):
+                moved[place] += amount * theta[paths.index(f"{kind}.{variable}")]
+    if torch.allclose(moved, theta):
+        return None
+    found = filling.z_of(moved)
+    exact = torch.allclose(filling.theta(found), moved, atol=1e-6)
+    within = torch.allclose(kept_within(filling, _turned(filling, found)), _turned(filling, found))
+    return _turned(filling, found) if exact and within else None
+
+
+def _turned(filling: Filling, z: Tensor) -> Tensor:
+    """Angles brought back by whole turns into the limits that a person gave, where they can be."""
+    turns = torch.tensor([unknown.range.turns and unknown.hard for unknown in filling.moving])
+    lower = torch.tensor([unknown.range.lower for unknown in filling.moving]).double()
+    return torch.where(turns, lower + (z - lower) % 360, z)
+
+
+def _answer(session: Session, fit: _Fit) -> Answer:
+    program = fit.curve.filling.program(fit.curve.z, fit.setting)
+    score = program_score(session, program)
+    return Answer(program, structure_of(program), score, score)
+
+
+def program_score(session: Session, program: Program) -> float:
+    """The normalised score of a program, as `p3i score` gives it; 0 where too little of it is in sight."""
+    evidence = session.evidence
+    pattern = compile(program)
+    points, front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
+    seen = front & in_frame(points, evidence.image.size)
+    if int(seen.sum()) < 4:
+        return 0.0
+    if structure_of(program) == "lattice" and nest(program).for_i and nest(program).for_j:
+        return normalised_score(evidence, pattern, seen)
+    found = patch_contrast(
+        evidence,
+        pattern,
+        pattern.theta,
+        pattern.index[seen].double(),
+        side=spacing(pattern, pattern.theta),
+        focal_mm=evidence.focal_mm,
+    )
+    return score_of(found.contrast)
+
+
+def structure_of(program: Program) -> StructureFound:
+    """What a program's pattern is called: circular for one curve, hybrid for several, else lattice."""
+    parts = nest(program)
+    if not any(isinstance(form, Polar) for form in (parts.draw.x, parts.draw.y)):
+        return "lattice"
+    return "hybrid" if parts.for_i is not None and parts.for_j is not None else "circular"
+
+
+def _different(answers: list[Answer]) -> list[Answer]:
+    """Those whose text none before them has."""
+    kept: dict[Program, Answer] = {}
+    for answer in answers:
+        kept.setdefault(answer.program, answer)
+    return list(kept.values())
+
+
+def _text(filling: Filling, z: Tensor, setting: int) -> str:
+    from p3i.grammar.printer import format_program
+
+    return format_program(filling.program(z, filling.settings[setting]))
