@@ -64,7 +64,8 @@ class Fit:
 
 def measure(level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | None = None) -> Fit | None:
     """How well theta explains the picture. `start` [M, 2] are cells that the mean starts from."""
-    index = cells_in_view(level, pattern, theta)
+    around = None if start is None else start.median(0).values
+    index = cells_in_view(level, pattern, theta, around=around)
     if len(index) < _FEWEST:
         return None
     weights = torch.ones(len(index)) if start is None else _members(index, start).float()

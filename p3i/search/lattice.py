@@ -24,6 +24,9 @@ TEMPLATE = Program(
 PHASE = frozenset({"draw.x.1", "draw.y.1"})
 """The numbers that shift all cells alike."""
 
+# Steps to each side of a cell within which its surroundings are looked for.
+_FARTHEST = 60
+
 _CORNERS = torch.tensor([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]], dtype=torch.float64)
 
 
@@ -116,11 +119,18 @@ def reduce_basis(basis: np.ndarray) -> np.ndarray:
 
 
 def cells_in_view(
-    level: Level, pattern: Pattern, theta: Tensor, *, least_px: float = 4.0, most: int = 600
+    level: Level,
+    pattern: Pattern,
+    theta: Tensor,
+    *,
+    least_px: float = 4.0,
+    most: int = 600,
+    around: Tensor | None = None,
 ) -> Tensor:
     """The indices of the cells that lie wholly in the picture: float64 [N, 2].
 
-    Cells smaller than `least_px` map pixels a side are left out; of more than `most` the largest stay.
+    Cells smaller than `least_px` map pixels a side are left out; of more than `most` the largest stay, or,
+    where a cell `around` [2] is given, those that are the fewest steps from it.
     """
     matrix = map_from_index(level, pattern, theta)
     index_from_map = np.linalg.inv(matrix)
@@ -136,6 +146,9 @@ def cells_in_view(
         return empty
     reached = seen[:2, near] / seen[2, near]
     low, high = np.floor(reached.min(1)), np.ceil(reached.max(1))
+    if around is not None:  # what lies farther off than all that are wanted need not be looked at
+        low = np.maximum(low, np.floor(around.numpy()) - _FARTHEST)
+        high = np.maximum(np.minimum(high, np.ceil(around.numpy()) + _FARTHEST), low)
     if not np.isfinite(low).all() or (high - low).max() > 400 or (high - low).prod() > 40_000:
         return empty
     index = torch.cartesian_prod(
@@ -146,7 +159,8 @@ def cells_in_view(
     inside &= area > least_px**2
     index, area = index[inside], area[inside]
     if len(index) > most:
-        index = index[torch.sort(area, descending=True, stable=True).indices[:most].sort().values]
+        rank = -area if around is None else (index - around).square().sum(1)
+        index = index[torch.sort(rank, stable=True).indices[:most].sort().values]
     return index
 
 
