@@ -35,10 +35,11 @@ def hybrid_scene(
 
 def _plan(kind: str, random: Random, options: RingOptions) -> Staged:
     make = {"concentric": _concentric, "fan": _fan, "row": _row}[kind]
+    rings = int(random.choice([2, 3, 3, 4]))
     swelling = kind == "concentric" and random.random() < 0.3
 
     def draw(random: Random) -> tuple[RingLayout, float]:
-        layout = make(random)
+        layout = make(random, rings)
         least = min(map(layout.radius_of, layout.counts()))
         cap = min(layout.chord() / 1.6, 0.6 * least, 12.0)
         return layout, round(float(cap * random.uniform(0.7, 1)), 2)
@@ -46,9 +47,9 @@ def _plan(kind: str, random: Random, options: RingOptions) -> Staged:
     return planned(draw, random, options, cut=0 if kind == "fan" else 0.1, swelling=swelling)
 
 
-def _concentric(random: Random) -> RingLayout:
+def _concentric(random: Random, rings: int) -> RingLayout:
     """The same count on each ring, side by side."""
-    count, rings = int(random.integers(6, 21)), int(random.integers(2, 5))
+    count = int(random.integers(6, 21))
     growth = float(random.uniform(5, 13))
     return RingLayout(
         center=_center(random, 14),
@@ -61,9 +62,8 @@ def _concentric(random: Random) -> RingLayout:
     )
 
 
-def _fan(random: Random) -> RingLayout:
+def _fan(random: Random, rings: int) -> RingLayout:
     """Table 1's count: ring i has `count*i` objects at one step, so the arcs get longer with i."""
-    rings = int(random.choice([2, 3, 3, 4, 4]))
     count = int(random.integers(4, 8)) if rings > 2 else int(random.integers(5, 9))
     first = 2 if rings == 3 and random.random() < 0.4 else 1
     last = first + rings - 1
@@ -83,9 +83,9 @@ def _fan(random: Random) -> RingLayout:
     )
 
 
-def _row(random: Random) -> RingLayout:
+def _row(random: Random, rings: int) -> RingLayout:
     """A ring that comes again along a line, clear of itself."""
-    count, rings = int(random.integers(6, 13)), int(random.integers(2, 5))
+    count = int(random.integers(6, 13))
     radius = float(random.uniform(7, 16))
     turn = random.uniform(0, 2 * np.pi)
     step = 2 * radius * random.uniform(1.3, 1.7)

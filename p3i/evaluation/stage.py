@@ -124,11 +124,15 @@ def lab(colours: np.ndarray) -> np.ndarray:
 
 
 def stands_out(look: np.ndarray, ground: np.ndarray, *, least: float) -> bool:
-    """Whether a sprite (RGBA [S, S, 4]) differs from the Lab colours [N, 3] that it will lie on."""
+    """Whether a sprite (RGBA [S, S, 4]) differs from most Lab colours [N, 3] that it will lie on.
+
+    By `least` in all, and by a third of it in lightness: colour alone is hard to see.
+    """
     weight = look[..., 3:]
     mean = (look[..., :3] * weight).sum(axis=(0, 1)) / weight.sum()
-    apart = np.linalg.norm(lab(mean[None]) - ground, axis=1)
-    return bool(np.quantile(apart, 0.2) >= least)
+    apart = lab(mean[None]) - ground
+    seen = (np.linalg.norm(apart, axis=1) >= least) & (np.abs(apart[:, 0]) >= least / 3)
+    return bool(seen.mean() >= 0.8)
 
 
 def _plane(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
