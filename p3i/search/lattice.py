@@ -24,6 +24,9 @@ TEMPLATE = Program(
 PHASE = frozenset({"draw.x.1", "draw.y.1"})
 """The numbers that shift all cells alike."""
 
+# A picture with fewer whole cells than this is looked at to its very edges: at cells of which this much shows.
+_FEW_WHOLE = 16
+_LEAST_SHOWN = 0.5
 # Steps to each side of a cell within which its surroundings are looked for.
 _FARTHEST = 60
 
@@ -126,11 +129,13 @@ def cells_in_view(
     least_px: float = 4.0,
     most: int = 600,
     around: Tensor | None = None,
+    few: int = _FEW_WHOLE,
 ) -> Tensor:
     """The indices of the cells that lie wholly in the picture: float64 [N, 2].
 
     Cells smaller than `least_px` map pixels a side are left out; of more than `most` the largest stay, or,
-    where a cell `around` [2] is given, those that are the fewest steps from it.
+    where a cell `around` [2] is given, those that are the fewest steps from it. Where fewer than `few` lie
+    wholly in the picture, those that half do are taken too: a pattern of large cells has no others.
     """
     matrix = map_from_index(level, pattern, theta)
     index_from_map = np.linalg.inv(matrix)
@@ -156,6 +161,8 @@ def cells_in_view(
         torch.arange(low[1], high[1] + 1, dtype=torch.float64),
     )
     area, inside = cell_areas(matrix, index, level)
+    if int((inside & (area > least_px**2)).sum()) < few:
+        inside = _shown(matrix, index, level) >= _LEAST_SHOWN
     inside &= area > least_px**2
     index, area = index[inside], area[inside]
     if len(index) > most:
@@ -173,6 +180,19 @@ def cell_areas(matrix: np.ndarray, index: Tensor, level: Level) -> tuple[Tensor,
     a, b = points[:, 2] - points[:, 0], points[:, 3] - points[:, 1]
     area = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     return torch.from_numpy(area), torch.from_numpy(inside)
+
+
+def _shown(matrix: np.ndarray, index: Tensor, level: Level) -> Tensor:
+    """The share of each cell [N] that lies in the picture, under `matrix` (index -> map)."""
+    steps = (np.arange(4) + 0.5) / 4 - 0.5
+    within = np.stack(np.meshgrid(steps, steps), -1).reshape(-1, 2)
+    at = (index.numpy()[:, None] + within[None]).reshape(-1, 2)
+    moved = np.column_stack([at, np.ones(len(at))]) @ matrix.T
+    in_front = moved[:, 2] > 1e-9
+    points = moved[:, :2] / np.where(in_front, moved[:, 2], 1)[:, None]
+    limits = np.array([level.size.width - 1, level.size.height - 1])
+    inside = in_front & (points >= -0.5).all(1) & (points <= limits + 0.5).all(1)
+    return torch.from_numpy(inside.reshape(len(index), -1).mean(1))
 
 
 def cell_corners(matrix: np.ndarray, index: Tensor) -> tuple[np.ndarray, np.ndarray]:

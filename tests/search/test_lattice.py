@@ -158,8 +158,28 @@ def test_the_cells_in_view_are_those_whose_corners_are(lattice: Lattice, least_p
     expected = naive_cells(lattice, least_px=least_px)
     # Cells on the very edge of either limit are a matter of rounding.
     sure = {cell for cell, area in expected.items() if area > 1.001 * least_px**2}
-    found = cells_in_view(blank_level(), PATTERN, lattice.theta(PATTERN), least_px=least_px, most=10_000)
+    found = cells_in_view(
+        blank_level(), PATTERN, lattice.theta(PATTERN), least_px=least_px, most=10_000, few=0
+    )
     assert sure <= {(int(i), int(j)) for i, j in found.tolist()} <= expected.keys()
+
+
+def test_where_few_cells_are_whole_those_that_half_show_are_taken_too() -> None:
+    lattice = Lattice(0.0, 0.0, np.array([[30.0, 0.0], [0.0, 30.0]]), np.zeros(2))
+    theta = lattice.theta(PATTERN)
+    whole = cells_in_view(blank_level(), PATTERN, theta, few=0).tolist()
+    # 100 x 75 units show: 1.17 cells to each side of the middle one across, 0.75 up and down.
+    assert whole == [[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]
+    every = cells_in_view(blank_level(), PATTERN, theta).tolist()
+    assert every == [[float(i), float(j)] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+
+
+def test_of_too_many_cells_those_around_a_cell_stay() -> None:
+    lattice = Lattice(-45.0, 10.0, np.array([[4.0, 0.5], [-0.5, 4.0]]), np.zeros(2))
+    around = torch.tensor([3.0, -8.0], dtype=torch.float64)
+    found = cells_in_view(blank_level(), PATTERN, lattice.theta(PATTERN), most=40, around=around)
+    assert len(found) == 40
+    assert float((found - around).norm(dim=1).max()) < 5
 
 
 def test_of_too_many_cells_the_largest_stay_in_order() -> None:
