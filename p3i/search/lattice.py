@@ -24,7 +24,7 @@ TEMPLATE = Program(
 PHASE = frozenset({"draw.x.1", "draw.y.1"})
 """The numbers that shift all cells alike."""
 
-# A picture with fewer whole cells than this is looked at to its very edges: at cells of which this much shows.
+# A picture with fewer whole cells is looked at to its very edges: at cells of which this much shows.
 _FEW_WHOLE = 16
 _LEAST_SHOWN = 0.5
 # Steps to each side of a cell within which its surroundings are looked for.
