@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from p3i.errors import UsageError
 from p3i.grammar.ast import Header, Program
-from p3i.language import check, dump, dumps, expand, format, load, loads
+from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
 from p3i.paint.options import RenderOptions
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
@@ -59,7 +59,8 @@ def synth(
 ) -> SynthesisResult:
     """Find the camera and the program of the pattern on `photo`.
 
-    `options` are fields of SearchConfig and change `config`: `synth("a.jpg", seed=1, time_s=5)`. What is
+    `options` are fields of SearchConfig and change `config`: `synth("a.jpg", seed=1, time_s=5)`; `sketch`
+    and `start` may be paths of files. What is
     white in the picture `mask`, or True in the array `mask` [H, W], and what lies outside the polygon `roi`
     ((x, y) in pixels) is unknown: never evidence. `max_px` bounds width times height of a photo that is
     read here. The header of the program names the photo relative to the folder `beside` (default: the
@@ -73,6 +74,9 @@ def synth(
     known = {field.name for field in dataclasses.fields(SearchConfig)}
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"synth has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
+    for name, reader in (("sketch", load_sketch), ("start", load)):
+        if isinstance(options.get(name), str | os.PathLike):
+            options[name] = reader(options[name])
     config = dataclasses.replace(config or SearchConfig(), **options)
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
     result = synthesize(_without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)

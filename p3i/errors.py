@@ -28,6 +28,17 @@ class ProgramError(P3IError):
     exit_code = 4
 
 
+class SketchError(ProgramError):
+    """A sketch, or a program to start from, that cannot be fitted to a photo.
+
+    `place` says where (a file, a path of the program), `reason` what is wrong, `mend` what to write instead.
+    """
+
+    def __init__(self, *, place: str, reason: str, mend: str) -> None:
+        super().__init__(f"{place}: {reason}; {mend}")
+        self.place, self.reason, self.mend = place, reason, mend
+
+
 class NoPatternError(P3IError):
     """A photo shows no regular pattern that p3i would vouch for."""
 

@@ -67,6 +67,18 @@ def load(path: str | os.PathLike[str], *, strict: bool = False) -> Program:
     return loads(read(path), strict=strict, path=os.fspath(path))
 
 
+def load_sketch(path: str | os.PathLike[str]) -> Sketch:
+    """The sketch in the file at `path`; a program without holes is one too.
+
+    Raises FileError for the file, ParseError for its text.
+    """
+    source = read(path)
+    sketch = parse_sketch(source)
+    if isinstance(sketch, tuple):
+        raise ParseError(sketch, source=source_text(source), path=os.fspath(path))
+    return sketch
+
+
 def dump(program: Program, path: str | os.PathLike[str], *, layout: Layout = "python") -> None:
     """Write the program's text to `path`, whole or not at all, over what is there. Raises FileError."""
     write(path, dumps(program, layout=layout))

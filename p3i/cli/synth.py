@@ -15,7 +15,7 @@ from p3i import api, files
 from p3i.cli import options, progress, report, search_options
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
-from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, sentence
+from p3i.search.config import EXTENTS, RECIPES, STRUCTURES, SearchConfig, default, sentence
 from p3i.search.result import StopReason, SynthesisResult
 
 
@@ -67,6 +67,16 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
     show_default=True,
     help=sentence("extent"),
 )
+@click.option("--sketch", type=click.Path(), metavar="FILE", help=sentence("sketch"))
+@click.option("--start", type=click.Path(), metavar="FILE", help=sentence("start"))
+@click.option(
+    "--recipe",
+    type=click.Choice(RECIPES),
+    default=default("recipe"),
+    show_default=True,
+    help=sentence("recipe"),
+)
+@click.option("--exhaustive", "exhaustive_s", type=float, metavar="SECONDS", help=sentence("exhaustive_s"))
 @click.option("--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown.")
 @click.option(
     "--roi",
@@ -124,6 +134,9 @@ class Call:
         chosen = {name: value for name, value in given.items() if name in names}
         if chosen["weights"] is not None:
             chosen["weights"] = Path(chosen["weights"])
+        for name, reader in (("sketch", api.load_sketch), ("start", api.load)):
+            if chosen[name] is not None:
+                chosen[name] = reader(chosen[name])
         config = SearchConfig(**chosen)
         photos = tuple(files.gather(given["images"], suffixes=SUFFIXES))
         output: str | None = given["output"]

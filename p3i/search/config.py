@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
-from p3i.errors import UsageError
+from p3i.errors import SketchError, UsageError
+from p3i.grammar.ast import Program
+from p3i.grammar.sketch import Sketch
 
 Structure = Literal["auto", "lattice"]
 Extent = Literal["found", "image"]
+Recipe = Literal["p3i", "paper"]
 
 STRUCTURES: tuple[Structure, ...] = ("auto", "lattice")
 MOST_K1 = 0.4
@@ -21,6 +24,7 @@ MOST_K1 = 0.4
 
 DEVICES: tuple[str, ...] = ("auto", "cpu")
 EXTENTS: tuple[Extent, ...] = ("found", "image")
+RECIPES: tuple[Recipe, ...] = ("p3i", "paper")
 FEATURES: tuple[str, ...] = ("oriented", "rgb", "lite0", "alexnet")
 """The names of p3i.vision.features.EXTRACTORS, repeated here so that `--help` need not load torch."""
 
@@ -50,6 +54,20 @@ class SearchConfig:
     extent: Annotated[
         Extent, "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
     ] = "found"
+    sketch: Annotated[
+        Sketch | None, "A program with holes to fill (??, ?name, ~start), instead of a search."
+    ] = None
+    start: Annotated[
+        Program | None, "A program to refine: camera and Draw move, bounds and guards stay, no search."
+    ] = None
+    recipe: Annotated[
+        Recipe,
+        "How to search: p3i, or paper for the paper's own way, for comparison: equation 2 as printed, "
+        "a grid of 2 units, gradient descent, features alexnet (with --weights) or else rgb, --extent image.",
+    ] = "p3i"
+    exhaustive_s: Annotated[
+        float | None, "Seconds to walk through sketches of no known family as well, the shortest first."
+    ] = None
     strict: Annotated[bool, "Fit and print programs of the paper's Table 1 only."] = False
     seed: Annotated[int, "Seed of everything random; equal seeds give equal programs."] = 0
     time_s: Annotated[
@@ -65,11 +83,16 @@ class SearchConfig:
         if self.structure in ("circular", "hybrid"):
             raise UsageError(f"--structure {self.structure} is not there yet: this version finds lattices")
         _one_of("structure", self.structure, STRUCTURES)
+        if self.recipe == "paper":  # one configuration, whole
+            if self.features == default("features"):
+                object.__setattr__(self, "features", "rgb" if self.weights is None else "alexnet")
+            object.__setattr__(self, "extent", "image")
         parts = [part.strip() for part in self.features.split("+")]
         for part in parts:
             _one_of("features", part, FEATURES)
         _one_of("extent", self.extent, EXTENTS)
         _one_of("device", self.device, DEVICES)
+        self._check_asked()
         if isinstance(self.focal_mm, str):
             _one_of("the focal length, where no number,", self.focal_mm, ("auto",))
         elif self.focal_mm is not None and not (
@@ -90,6 +113,24 @@ class SearchConfig:
             raise UsageError(f"a seed is a whole number from 0, not {self.seed}")
         if ("alexnet" in parts) != (self.weights is not None):
             raise UsageError("the features alexnet, and only they, need a file with weights (--weights FILE)")
+
+    def _check_asked(self) -> None:
+        """What says how to search: a sketch, a start, a recipe, or nothing."""
+        _one_of("recipe", self.recipe, RECIPES)
+        asked = [name for name in ("sketch", "start") if getattr(self, name) is not None]
+        asked += ["recipe paper"] if self.recipe == "paper" else []
+        asked += ["exhaustive"] if self.exhaustive_s is not None else []
+        if len(asked) > 1:
+            raise UsageError(f"--{asked[0]} and --{asked[1]} contradict each other: leave one out")
+        if self.sketch is not None and not self.sketch.holes:
+            mend = "write `??` for a number to be found, or give the program with --start to refine it whole"
+            raise SketchError(place="the sketch", reason="nothing in it is left to be found", mend=mend)
+        if self.exhaustive_s is not None and not self.exhaustive_s > 0:
+            raise UsageError(f"the time must be more than 0 seconds, not {self.exhaustive_s:g}")
+        if asked and self.structure not in ("auto", "lattice" if asked[0] == "recipe paper" else "auto"):
+            raise UsageError(f"--{asked[0]} and --structure {self.structure} contradict each other")
+        if asked and asked[0] in ("sketch", "start") and self.extent == "image":
+            raise UsageError(f"--{asked[0]} says itself which objects are drawn: leave out --extent image")
 
 
 def sentence(name: str) -> str:

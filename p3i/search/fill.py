@@ -131,6 +131,9 @@ def _unknown(holes: list[Hole], sketch: Sketch, canvas: tuple[float, float]) -> 
         for hole in holes
     ]
     narrowest = min(ranges, key=lambda found: found.upper - found.lower)
+    lower, upper = max(found.lower for found in ranges), min(found.upper for found in ranges)
+    if lower < upper:
+        narrowest = replace(narrowest, lower=lower, upper=upper)
     hard = first.lower is not None and first.upper is not None
     if hard:
         assert first.lower is not None and first.upper is not None
@@ -166,7 +169,9 @@ def with_settings(filling: Filling, settings: tuple[tuple[int, ...], ...]) -> Fi
 def pinned(filling: Filling, z: Tensor, which: Tensor) -> Filling:
     """The same filling with the numbers `which` bool [F] held where z [F] has them."""
     held = which.to(z)
-    return replace(filling, base=filling.base + (z * held) @ filling.ties, ties=filling.ties * (1 - held)[:, None])
+    return replace(
+        filling, base=filling.base + (z * held) @ filling.ties, ties=filling.ties * (1 - held)[:, None]
+    )
 
 
 def all_settings(filling: Filling, *, most: int) -> tuple[tuple[int, ...], ...]:

@@ -37,6 +37,7 @@ class StopReason(Enum):
     TIME_UP = "the time was up before the search had ended"
     INTERRUPTED = "interrupted before the search had ended"
     NO_PATTERN = "no regular pattern"
+    NO_FIT = "the sketch does not fit this photo"
     TOO_SMALL = "the picture is too small to hold a pattern"
     FLAT = "the picture has too little contrast to hold a pattern"
     TOO_LITTLE_KNOWN = "too few pixels of the picture are known (the rest is masked or transparent)"
@@ -90,6 +91,6 @@ class SynthesisResult:
     @property
     def reason(self) -> str:
         """Why the search ended, as a sentence with its numbers; empty where there is nothing to explain."""
-        if self.stop is StopReason.NO_PATTERN and self.score is not None and self.needed is not None:
+        if self.stop in (StopReason.NO_PATTERN, StopReason.NO_FIT) and self.score is not None and self.needed is not None:
             return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
         return self.stop.value

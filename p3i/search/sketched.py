@@ -6,6 +6,7 @@ numbers that a person bounded stay within their bounds all the way.
 """
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import torch
 from torch import Tensor
@@ -31,14 +32,20 @@ from p3i.search.score import normalised_score, score_of
 from p3i.search.session import Answer, Session
 from p3i.vision.warp import in_frame
 
-# Points of the grid in all, and at least for each setting of the counts.
-_BUDGET, _LEAST_BUDGET = 60_000, 2_000
+
+class Effort(Enum):
+    """How hard to try: points of the grid in all, the least for each setting of the counts, fits."""
+
+    WHOLE = (60_000, 2_000, 10)
+    WALK = (24_000, 600, 4)
+
+
 # Objects that a sketch may draw in the coarse search, and settings of its extents there.
 _MOST_INDICES, _MOST_SETTINGS = 64, 8
 # Settings of the extents that are weighed in the end.
 _ALL_SETTINGS = 4000
-# Fillings that are fitted to objects, and rounds of that.
-_FITTED, _ROUNDS, _LAST_ROUNDS = 10, 3, 5
+# Rounds of registration.
+_ROUNDS, _LAST_ROUNDS = 3, 5
 # An object is worth drawing from this share of the typical contrast on.
 _PRESENT = 0.35
 _SHIFTS = [(1, 0), (-1, 0), (0, 1), (0, -1)]
@@ -53,7 +60,7 @@ class _Fit:
     worth: float
 
 
-def find_by_sketch(session: Session, sketch: Sketch) -> list[Answer]:
+def find_by_sketch(session: Session, sketch: Sketch, *, effort: Effort = Effort.WHOLE) -> list[Answer]:
     """Programs that fill the sketch, the best first; empty where no filling has objects in the photo."""
     size = session.evidence.image.size
     canvas = (size.width / size.unit_px, size.height / size.unit_px)
@@ -62,14 +69,15 @@ def find_by_sketch(session: Session, sketch: Sketch) -> list[Answer]:
     if not every:
         return []
     maps = PointMaps.of(session.evidence)
-    budget = max(_LEAST_BUDGET, _BUDGET // len(every))
+    points, least, fitted = effort.value
+    budget = max(least, points // len(every))
     found: list[Found] = []
     for place, filling in enumerate(every):
         if not session.go_on():
             break
         session.tell("looking through the holes", 0.7 * place / len(every))
-        found += search_grid(session, maps, filling, budget=budget, keep=_FITTED)
-    found = distinct(maps, sorted(found, key=lambda one: -one.score))[:_FITTED]
+        found += search_grid(session, maps, filling, budget=budget, keep=fitted)
+    found = distinct(maps, sorted(found, key=lambda one: -one.score))[:fitted]
     for one in found:
         session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
     answers: list[Answer] = []
@@ -84,9 +92,14 @@ def find_by_sketch(session: Session, sketch: Sketch) -> list[Answer]:
     return _different(sorted(answers, key=lambda answer: -answer.score))
 
 
+def most_drawn(sketch: Sketch) -> int:
+    """The most objects that a filling of the sketch can draw."""
+    every = fillings(sketch, unknowns_of(sketch), most_indices=10**6, most_settings=_MOST_SETTINGS)
+    return max((int(filling.masks.sum(1).max()) for filling in every), default=0)
+
+
 def _fitted(session: Session, found: Found) -> _Fit | None:
     """A filling fitted to its objects, its extents chosen anew."""
-    evidence = session.evidence
     setting = found.filling.settings[found.setting]
     filling = with_settings(found.filling, (setting,))
     now = _followed(session, filling, found.z, rounds=_ROUNDS)
@@ -158,9 +171,7 @@ def _gains(session: Session, wide: Filling, z: Tensor, *, side: float, typical: 
     gains = torch.full((len(seen),), -0.02 * typical, dtype=torch.float64)
     if int(seen.sum()) >= 3:
         index = wide.pattern.index[seen].double()
-        found = patch_contrast(
-            evidence, wide.pattern, theta, index, side=side, focal_mm=evidence.focal_mm
-        )
+        found = patch_contrast(evidence, wide.pattern, theta, index, side=side, focal_mm=evidence.focal_mm)
         gains[seen] = found.contrast.double() - _PRESENT * typical
     return gains
 

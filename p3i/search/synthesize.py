@@ -3,13 +3,14 @@
 import numpy as np
 
 from p3i.grammar.ast import Program
+from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence
+from p3i.search.focal import with_own_focal
 from p3i.search.lens import find_with_lens
 from p3i.search.region import centers_px, region_px
 from p3i.search.result import (
     FOCAL_REASONS,
-    NEEDED,
     Candidate,
     FocalSource,
     StopReason,
@@ -50,12 +51,16 @@ def synthesize(
     hopeless = _hopeless(image)
     if hopeless is not None:
         return result(None, hopeless)
+    check_asked(config, image.size)
     session = Session(Evidence(image, config, focal_mm), config, progress, trace)
     answers = _found(session) if config.lens is None else find_with_lens(session, _found)
-    good = [answer for answer in answers if answer.score >= NEEDED]
+    needed = needed_for(config)
+    if config.focal_mm == "auto" and config.sketch is None and config.start is None:
+        answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
+    good = [answer for answer in answers if answer.score >= needed]
     if not good:
         best = max((answer.score for answer in answers), default=0.0)
-        return result(None, session.stopped or StopReason.NO_PATTERN, score=best, needed=NEEDED)
+        return result(None, session.stopped or why_not(config), score=best, needed=needed)
     first = good[0]
     margin = first.worth - max((answer.worth for answer in answers if answer is not first), default=0.0)
     session.tell("done", 1.0)
@@ -65,7 +70,7 @@ def synthesize(
         structure=first.structure,
         score=first.score,
         margin=margin / max(first.worth, 1e-9),
-        needed=NEEDED,
+        needed=needed,
         candidates=tuple(
             Candidate(
                 program=answer.program,
@@ -87,18 +92,25 @@ def _found(session: Session) -> list[Answer]:
     """What every family that is asked for finds, the most worth first; an interrupt ends the search."""
     answers: list[Answer] = []
     try:
-        for family in FAMILIES:
+        asked = asked_for(session.config)
+        if asked is not None:
+            answers += asked(session)
+        for family in FAMILIES if asked is None else ():
             if session.config.structure in ("auto", family.structure):
                 answers += family.find(session)
+        if session.config.exhaustive_s is not None:
+            answers += walk(session)
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
     return sorted(answers, key=lambda answer: -answer.worth)
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
-    """The focal that is assumed, and why: the option, the photo's EXIF data, or 35 mm."""
+    """The focal that is assumed, and why: the option, a sketch's header, the photo's EXIF data, or 35 mm."""
     if config.focal_mm is not None and config.focal_mm != "auto":
         return config.focal_mm, "option"
+    if (stated := stated_focal(config)) is not None:
+        return stated, "header"
     if image.focal_mm is not None:
         return image.focal_mm, "exif"
     return 35.0, "default"

@@ -1,0 +1,110 @@
+"""What a person asked for in place of the families: a sketch to fill, a program to refine, a recipe."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+from p3i.errors import SketchError
+from p3i.grammar.ast import Header
+from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.printer import format_program
+from p3i.search.config import SearchConfig
+from p3i.search.enumerate import sketches_by_length
+from p3i.search.fill import whole_program_sketch
+from p3i.search.paper import find_by_paper
+from p3i.search.result import NEEDED, StopReason
+from p3i.search.session import Answer, Session
+from p3i.search.sketched import Effort, find_by_sketch, most_drawn
+from p3i.search.sketches import FAMILIES
+from p3i.size import Size
+
+# A sketch that draws fewer objects than this fixes neither camera nor pattern.
+_FEWEST_OBJECTS = 4
+# Canvases whose sides differ in proportion by more than this are not the same picture.
+_SAME_SHAPE = 0.02
+
+
+def asked_for(config: SearchConfig) -> Callable[[Session], list[Answer]] | None:
+    """How to find the programs that the options ask for; None where the families are to be asked."""
+    if config.recipe == "paper":
+        return find_by_paper
+    sketch = config.sketch
+    if config.start is not None:
+        sketch = whole_program_sketch(config.start)
+    if sketch is None:
+        return None
+    return lambda session: find_by_sketch(session, sketch)
+
+
+def why_not(config: SearchConfig) -> StopReason:
+    """The reason to give where nothing reached the score that an answer needs."""
+    by_hand = config.sketch is not None or config.start is not None
+    return StopReason.NO_FIT if by_hand else StopReason.NO_PATTERN
+
+
+def needed_for(config: SearchConfig) -> float:
+    """The score that an answer must reach: none for the paper's recipe, which always answers."""
+    return 0.0 if config.recipe == "paper" else NEEDED
+
+
+def stated_focal(config: SearchConfig) -> float | None:
+    """The focal that the header of a sketch or a start names, in mm."""
+    header = _header(config)
+    return header.focal_mm if header is not None else None
+
+
+def check_asked(config: SearchConfig, size: Size) -> None:
+    """Raise SketchError where a sketch or a start cannot be fitted to a photo of this size."""
+    name = "the sketch" if config.sketch is not None else "the program to start from"
+    header = _header(config)
+    if header is not None and header.canvas is not None:
+        wide, tall = header.canvas
+        if abs(math.log(wide / tall * size.height / size.width)) > _SAME_SHAPE:
+            raise SketchError(
+                place=name,
+                reason=f"its canvas is {wide} x {tall}, and the photo is {size.width} x {size.height}",
+                mend="give the photo that it was written for, or take `canvas` out of its header",
+            )
+    sketch = config.sketch or (whole_program_sketch(config.start) if config.start is not None else None)
+    if sketch is None:
+        return
+    if config.strict:
+        try:
+            format_program(dataclasses.replace(sketch.template, header=None), layout="table1")
+        except ParseError as outside:
+            raise SketchError(
+                place=name,
+                reason=f"it leaves Table 1: {outside.diagnostics[0].message}",
+                mend="keep to Table 1, or leave out --strict",
+            ) from None
+    drawn = most_drawn(sketch)
+    if drawn < _FEWEST_OBJECTS:
+        raise SketchError(
+            place=name,
+            reason=f"it draws {drawn} objects at most, too few to fix camera and pattern",
+            mend=f"let its loops draw {_FEWEST_OBJECTS} or more",
+        )
+
+
+def walk(session: Session) -> list[Answer]:
+    """Programs of the enumerated sketches without a family, the shortest first, while time lasts."""
+    assert session.config.exhaustive_s is not None
+    deadline = session.elapsed() + session.config.exhaustive_s
+    answers: list[Answer] = []
+    covered = {family.structure for family in FAMILIES}
+    for one in sketches_by_length():
+        if one.family in covered:
+            continue
+        if not session.go_on() or session.elapsed() > deadline:
+            break
+        found = find_by_sketch(session, one.sketch, effort=Effort.WALK)[:2]
+        session.record(
+            "sketch", name=one.name, bits=one.bits, score=max((a.score for a in found), default=0.0)
+        )
+        answers += found
+    return answers
+
+
+def _header(config: SearchConfig) -> Header | None:
+    template = config.start if config.start is not None else config.sketch and config.sketch.template
+    return template.header if template is not None else None
