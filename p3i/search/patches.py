@@ -22,7 +22,7 @@ from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.cells import HALF_STEPS, Cells, Contrast, agreement, agreement_with_others, mean_cell
 from p3i.search.evidence import ColourMap, Evidence
-from p3i.search.register import Instances, correlate
+from p3i.search.register import Instances, correlate, mean_of_others
 from p3i.vision.warp import sample, sample_valid
 
 SIDE = 14
@@ -218,8 +218,8 @@ def find_objects(
     weights: Tensor,
     *,
     side: float,
-    reach: int = REACH,
     focal_mm: Tensor | float,
+    reach: int = REACH,
 ) -> Instances:
     """Search around each patch of `index` [N, 2] for the mean patch; `weights` [N] make that mean.
 
@@ -229,8 +229,10 @@ def find_objects(
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
     colours = evidence.colours_for(sample_px(matrix, where))
     patches = read(colours, matrix, where, count=SIDE + 2 * reach)
-    offsets, peak, lead = correlate(
-        patches.values, patches.known.float()[:, None], weights, side=SIDE, reach=reach
-    )
+    known = patches.known.float()[:, None]
+    middle = slice(reach, reach + SIDE)
+    own, own_known = patches.values[:, :, middle, middle], known[:, :, middle, middle]
+    templates = mean_of_others(own, own_known, weights)
+    offsets, peak, lead = correlate(patches.values, known, templates)
     # Rows of a patch run across the curve, columns along it.
     return Instances(index, offsets.flip(1) / SIDE, peak, lead)

@@ -60,36 +60,37 @@ def find_instances(
     cells = read_cells(level, pattern, theta, index, torch.cartesian_prod(steps, steps))
     planes = cells.values.reshape(len(index), wide, wide, -1).permute(0, 3, 1, 2)  # [N, C, a, b]
     known = cells.known.reshape(len(index), 1, wide, wide).float()
-    offsets, peak, lead = correlate(planes, known, weights, side=_SIDE, reach=_REACH)
+    middle = slice(_REACH, _REACH + _SIDE)
+    templates = mean_of_others(planes[:, :, middle, middle], known[:, :, middle, middle], weights)
+    offsets, peak, lead = correlate(planes, known, templates)
     return Instances(index, offsets / _SIDE, peak, lead)
 
 
-def correlate(
-    planes: Tensor, known: Tensor, weights: Tensor, *, side: int, reach: int
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Where in each plane its middle, as the other planes have it, fits best.
+def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
+    """For each cell [N, C, s, s] the weighted mean of all others; known [N, 1, s, s] 0 or 1, weights [N]."""
+    weight = known * weights.float()[:, None, None, None]
+    total = weight.sum(0, keepdim=True)
+    mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
+    rest = (total - weight).clamp(min=1e-6)
+    others = (mean * total - weight * own) / rest
+    return torch.where(total - weight > 1e-3, others, mean)
 
-    Shapes: planes [N, C, w, w] with w = side + 2 * reach, known [N, 1, w, w] 0 or 1, weights [N] ->
+
+def correlate(planes: Tensor, known: Tensor, templates: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Where in each plane its template fits best.
+
+    Shapes: planes [N, C, w, w], known [N, 1, w, w] 0 or 1, templates [N, C, s, s] with w - s even ->
     offsets [N, 2] in samples (row, column), the agreement there [N], and its lead over the rim [N].
     """
     count, channels, wide, _ = planes.shape
-    middle = slice(reach, reach + side)
-    own = planes[:, :, middle, middle]
-    own_known = known[:, :, middle, middle]
-    weight = own_known * weights.float()[:, None, None, None]
-    total = weight.sum(0, keepdim=True)
-    mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
-    # Grouped correlation: each cell with the mean of the others.
-    rest = (total - weight).clamp(min=1e-6)
-    others = (mean * total - weight * own) / rest
-    others = torch.where(total - weight > 1e-3, others, mean)
-    kernel = others.reshape(-1, 1, side, side)
+    side = templates.shape[-1]
+    kernel = templates.reshape(-1, 1, side, side)
     inner = F.conv2d(planes.reshape(1, count * channels, wide, wide), kernel, groups=kernel.shape[0])
     inner = inner.reshape(count, channels, *inner.shape[-2:]).sum(1)
     energy = F.conv2d(planes.square().sum(1, keepdim=True), torch.ones(1, 1, side, side))[:, 0]
-    squared = others.square().sum(1)
-    of_mean = F.conv2d(known.reshape(1, count, wide, wide), squared[:, None], groups=count)[0]
-    return _peaks(2 * inner / (energy + of_mean).clamp(min=1e-6))
+    squared = templates.square().sum(1)
+    of_template = F.conv2d(known.reshape(1, count, wide, wide), squared[:, None], groups=count)[0]
+    return _peaks(2 * inner / (energy + of_template).clamp(min=1e-6))
 
 
 def _peaks(value: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -1,0 +1,269 @@
+"""Where rings may be: centres by votes of rotations, then radius and count by unrolling about them.
+
+A ring looks the same when it is turned about its centre. For each pose of a grid the picture is
+straightened and correlated with itself turned by some angles: a peak at the shift s speaks for the centre c
+with s = (I - R) c. Rims, dials and wheels speak at every angle, a ring of n objects at about 360/n and its
+multiples, all at one centre, and that point of the photo moves little with the pose. About each centre the
+photo is unrolled, angle against the logarithm of the radius (unrolled.py), where a ring is a row.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.interp.camera import image_from_plane
+from p3i.search.evidence import Evidence
+from p3i.search.propose.poses import pose_grid
+from p3i.search.propose.unrolled import Rows, best_rows, likeness, unroll
+
+Floats = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+# The canvas of a straightened view, in pixels a side, and of its padded transform.
+_CANVAS = 96
+_PADDED = 192
+_POSE_STEP_DEG = 15.0
+_MOST_TILT_DEG = 62.0
+# A view reaches to where things are this many times as far away as the nearest.
+_DEPTH_RANGE = 3.5
+# Turns that between them come close to a multiple of 360/n for every n from 5 on.
+_TURNS_DEG = (36.0, 45.0, 51.4, 60.0, 72.0)
+# So many of the turns must agree: a ring of few objects answers to few.
+_AGREEING = 2
+# Peaks of the votes are this far apart, in canvas pixels, and at most so many are kept of each pose.
+_APART = 9
+_MOST_OF_POSE = 8
+# An overlap of less than this share of the view's energy proves little.
+_LEAST_OVERLAP = 0.4
+# Centres closer than this share of the longer side are one.
+_SAME_CENTRE = 0.03
+_MOST_CENTRES = 16
+_POSES_A_CENTRE = 3
+# From so many centres the search climbs to the best pose and centre near by.
+_MOST_CLIMBED = 4
+# The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
+_STEP_DEG = 6.0
+_STEP_SHARE = 0.08
+_CLIMBS = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Vote:
+    """A centre that rotations speak for: photo pixels, and the pose under which they do."""
+
+    worth: float
+    rx_deg: float
+    ry_deg: float
+    center_px: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RingProposal:
+    """A ring worth refining: pose (degrees), centre and radius (program units), count, and its promise."""
+
+    rx_deg: float
+    ry_deg: float
+    focal_mm: float
+    center: Array
+    radius: float
+    count: int
+    worth: float
+
+
+def rotation_votes(evidence: Evidence) -> list[Vote]:
+    """The centres that rotations speak for, at most a few for each pose, the most votes first."""
+    colours = evidence.colours_for(evidence.image.size.longer / (2.5 * _CANVAS))
+    lab = np.ascontiguousarray(colours.values.permute(1, 2, 0).numpy())
+    known = colours.valid.numpy().astype(np.float32)
+    size, map_from_photo = evidence.image.size, colours.map_from_photo.numpy()
+    found: list[Vote] = []
+    for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, _MOST_TILT_DEG):
+        seen = image_from_plane(rx_deg, ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
+        view = _view(lab, known, map_from_photo @ seen)
+        if view is None:
+            continue
+        tensor, weights, map_from_view = view
+        votes = _votes(tensor, weights)
+        peaks = votes == cv2.dilate(votes, np.ones((_APART, _APART)))
+        rows, columns = np.nonzero(peaks & (votes > 0))
+        for place in np.argsort(-votes[rows, columns])[:_MOST_OF_POSE]:
+            at = np.linalg.inv(map_from_photo) @ map_from_view @ [columns[place], rows[place], 1.0]
+            center = at[:2] / at[2]
+            if (np.abs(center - size.middle) < 0.53 * np.array([size.width, size.height])).all():
+                found.append(Vote(float(votes[rows[place], columns[place]]), rx_deg, ry_deg, center))
+    return sorted(found, key=lambda vote: -vote.worth)
+
+
+def ring_proposals(evidence: Evidence) -> list[RingProposal]:
+    """Rings about the centres with the most votes, the most promising first."""
+    centres: list[tuple[Vote, list[Rows]]] = []
+    for votes in _by_centre(rotation_votes(evidence), evidence.image.size.longer):
+        centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
+    centres.sort(key=_promise, reverse=True)
+    found: list[RingProposal] = []
+    for vote, rows in centres[:_MOST_CLIMBED]:
+        if not rows:
+            continue
+        vote = _climbed(evidence, vote, rows[0])
+        center = _on_plane(evidence, vote)
+        for row in _rows_about(evidence, vote):
+            pose = vote.rx_deg, vote.ry_deg
+            worth = row.worth * math.sqrt(vote.worth)
+            found.append(RingProposal(*pose, evidence.focal_mm, center, row.radius, row.count, worth))
+    return sorted(found, key=lambda proposal: -proposal.worth)
+
+
+def _promise(centre: tuple[Vote, list[Rows]]) -> float:
+    vote, rows = centre
+    return rows[0].worth * math.sqrt(vote.worth) if rows else 0.0
+
+
+def _climbed(evidence: Evidence, vote: Vote, row: Rows) -> Vote:
+    """The pose and centre near the vote's under which the ring agrees best: one number after the other."""
+    numbers = np.array([vote.rx_deg, vote.ry_deg, *vote.center_px])
+    radius_px = row.radius * evidence.image.size.unit_px
+    steps = np.array([_STEP_DEG, _STEP_DEG, _STEP_SHARE * radius_px, _STEP_SHARE * radius_px])
+
+    def at(numbers: Array) -> Vote:
+        return Vote(vote.worth, float(numbers[0]), float(numbers[1]), numbers[2:])
+
+    def worth(numbers: Array) -> float:
+        moved = at(numbers)
+        pose, center = (moved.rx_deg, moved.ry_deg), _on_plane(evidence, moved)
+        strip = unroll(evidence, pose, center, focal_mm=evidence.focal_mm, about=row.radius)
+        return 0.0 if strip is None else likeness(strip, row.count)
+
+    best = worth(numbers)
+    for _ in range(_CLIMBS):
+        for place in range(len(numbers)):
+            for sign in (1.0, -1.0):
+                moved = numbers.copy()
+                moved[place] += sign * steps[place]
+                value = worth(moved)
+                if value > best:
+                    numbers, best = moved, value
+                    break
+            else:
+                steps[place] *= 0.5
+    return at(numbers)
+
+
+def _rows_about(evidence: Evidence, vote: Vote) -> list[Rows]:
+    center = _on_plane(evidence, vote)
+    strip = unroll(evidence, (vote.rx_deg, vote.ry_deg), center, focal_mm=evidence.focal_mm)
+    return [] if strip is None else best_rows(strip)
+
+
+def _on_plane(evidence: Evidence, vote: Vote) -> Array:
+    """The vote's centre in program units under its pose."""
+    matrix = image_from_plane(
+        vote.rx_deg, vote.ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm
+    ).numpy()
+    at = np.linalg.inv(matrix) @ [*vote.center_px, 1.0]
+    return at[:2] / at[2]
+
+
+def _by_centre(votes: list[Vote], longer: int) -> list[list[Vote]]:
+    """The votes for each of the best centres, each under its best few poses."""
+    groups: list[list[Vote]] = []
+    for vote in votes:
+        for group in groups:
+            if np.hypot(*(group[0].center_px - vote.center_px)) < _SAME_CENTRE * longer:
+                if len(group) < _POSES_A_CENTRE:
+                    group.append(vote)
+                break
+        else:
+            if len(groups) < _MOST_CENTRES:
+                groups.append([vote])
+    return groups
+
+
+def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, Floats, Array] | None:
+    """The picture straightened: the gradient's double angle as complex numbers, weights, view -> map."""
+    height, width = known.shape
+    x, y = np.meshgrid(np.linspace(0, width - 1, 17), np.linspace(0, height - 1, 17))
+    plane = np.linalg.inv(map_from_plane) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
+    if plane[2].max() <= 0:
+        return None
+    near = plane[2] >= plane[2].max() / _DEPTH_RANGE  # the third row is 1 / depth
+    points = plane[:2, near] / plane[2, near]
+    low, high = points.min(1), points.max(1)
+    unit = float((high - low).max()) / (_CANVAS - 1)
+    corner = (low + high) / 2 - unit * (_CANVAS - 1) / 2
+    map_from_view = map_from_plane @ np.array([[unit, 0, corner[0]], [0, unit, corner[1]], [0, 0, 1.0]])
+    rows, columns = np.mgrid[0:_CANVAS, 0:_CANVAS]
+    depth = map_from_view[2, 0] * columns + map_from_view[2, 1] * rows + map_from_view[2, 2]
+
+    def warped(planes: Floats) -> Floats:
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return cv2.warpPerspective(planes, map_from_view, (_CANVAS, _CANVAS), flags=flags)  # pyright: ignore
+
+    seen = cv2.erode(((depth > 0) & (warped(known) > 0.99)).astype(np.uint8), np.ones((5, 5)))
+    seen[:2] = seen[-2:] = 0
+    seen[:, :2] = seen[:, -2:] = 0
+    if not seen.any():
+        return None
+    tensor = double_angle(cv2.GaussianBlur(warped(lab), (0, 0), 0.8)) * seen
+    energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.08 * _CANVAS)
+    tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
+    nearest = depth[seen > 0].min()
+    # Evenly in the photo, so that a pose that blows up a few pixels does not win.
+    weights = seen * (nearest / np.maximum(depth, nearest)) ** 1.5
+    return tensor, weights.astype(np.float32), map_from_view
+
+
+def double_angle(lab: Floats) -> NDArray[np.complex64]:
+    """sqrt(|grad|) times e^(2i direction) of the colours [H, W, 3] together, as vision/oriented.py has it."""
+    gx = 0.5 * (np.roll(lab, -1, 1) - np.roll(lab, 1, 1))
+    gy = 0.5 * (np.roll(lab, -1, 0) - np.roll(lab, 1, 0))
+    squared = (gx * gx + gy * gy).sum(2)
+    z = (gx * gx - gy * gy).sum(2) + 2j * (gx * gy).sum(2)
+    return (z * (squared**0.25 / (squared + 0.4**2))).astype(np.complex64)
+
+
+def _votes(tensor: NDArray, weights: Floats) -> Floats:
+    """How much rotations speak for each pixel of the view as a centre: [_CANVAS, _CANVAS]."""
+    middle = (_CANVAS - 1) / 2
+    energy = np.abs(tensor) ** 2
+    turned_by: list[Floats] = []
+    first = _transform(tensor * weights)
+    rest = _transform(weights * energy - 1j * weights)
+    rows, columns = np.mgrid[0:_CANVAS, 0:_CANVAS] - middle
+    for turn_deg in _TURNS_DEG:
+        turn = math.radians(turn_deg)
+        rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        about_middle = np.hstack([rotation, (middle - rotation @ [middle, middle])[:, None]])
+
+        def turned(plane: NDArray, matrix: Array = about_middle) -> NDArray:
+            return cv2.warpAffine(np.ascontiguousarray(plane, np.float32), matrix, (_CANVAS, _CANVAS))
+
+        weight = turned(weights)
+        other = (turned(tensor.real) + 1j * turned(tensor.imag)) * np.exp(2j * turn)
+        alike = _correlation(first, _transform(other * weight))[..., 0]
+        # The imaginary part is sum w E w' + w E' w': the energy of both where they overlap.
+        both = _correlation(rest, _transform(weight * np.abs(other) ** 2 + 1j * weight))[..., 1]
+        ncc = 2 * alike / np.maximum(both, _LEAST_OVERLAP * both.max())
+        # What is turned about c lies shifted by (I - R) c from what is turned about the middle.
+        shift_x = -((1 - rotation[0, 0]) * columns - rotation[0, 1] * rows)
+        shift_y = -(-rotation[1, 0] * columns + (1 - rotation[1, 1]) * rows)
+        at = [(shift + _PADDED / 2).astype(np.float32) for shift in (shift_x, shift_y)]
+        centred = np.fft.fftshift(ncc).astype(np.float32)
+        turned_by.append(cv2.remap(centred, at[0], at[1], cv2.INTER_LINEAR))
+    votes = np.sort(np.stack(turned_by), 0)[-_AGREEING:].mean(0)
+    votes = votes - cv2.GaussianBlur(votes, (0, 0), 0.06 * _CANVAS)
+    return cv2.GaussianBlur(votes, (0, 0), 1.0)  # pyright: ignore[reportReturnType]
+
+
+def _transform(plane: NDArray) -> Floats:
+    padded = np.zeros((_PADDED, _PADDED, 2), np.float32)
+    padded[:_CANVAS, :_CANVAS, 0], padded[:_CANVAS, :_CANVAS, 1] = plane.real, plane.imag
+    return cv2.dft(padded, flags=cv2.DFT_COMPLEX_OUTPUT, nonzeroRows=_CANVAS)  # pyright: ignore
+
+
+def _correlation(first: Floats, second: Floats) -> Floats:
+    """sum over x of conj(a(x)) b(x + s), [_PADDED, _PADDED, 2] by the shift s, from the transforms."""
+    product = cv2.mulSpectrums(second, first, 0, conjB=True)
+    return cv2.idft(product, flags=cv2.DFT_SCALE | cv2.DFT_COMPLEX_OUTPUT)  # pyright: ignore
