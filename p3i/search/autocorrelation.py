@@ -23,10 +23,15 @@ _NEARLY_BEST = 0.8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Autocorrelation:
-    """`values` [S, S] float32, zero shift in the middle, -1 where too little overlaps; `judged` [S, S]."""
+    """All shifts [S, S], zero in the middle.
+
+    `values` float32, -1 where too little overlaps; `judged` where enough does; `trust` is the root of the
+    share of the view that overlaps itself: what few pixels say is said by chance more often.
+    """
 
     values: np.ndarray
     judged: np.ndarray
+    trust: np.ndarray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,13 +73,17 @@ def autocorrelation(view: np.ndarray, weights: np.ndarray) -> Autocorrelation:
     overlap = correlation(cv2.mulSpectrums(of_weights, of_weights, 0, conjB=True))
     judged = (overlap > _LEAST_OVERLAP * overlap[0, 0]) & (norm > _LEAST_OVERLAP * norm[0, 0])
     values = np.where(judged, inner / np.maximum(norm, 1e-6 * max(float(norm[0, 0]), 1e-9)), -1)
-    return Autocorrelation(np.fft.fftshift(values).astype(np.float32), np.fft.fftshift(judged))
+    trust = np.sqrt(np.clip(overlap / max(float(overlap[0, 0]), 1e-9), 0, 1))
+    return Autocorrelation(
+        np.fft.fftshift(values).astype(np.float32), np.fft.fftshift(judged), np.fft.fftshift(trust)
+    )
 
 
 def best_pair(found: Autocorrelation, *, least: float, most: float) -> ShiftPair | None:
     """The two shifts between `least` and `most` pixels that best span a lattice, None where there is none.
 
-    A shift's worth is its valley contrast: its value less the least on the way from zero. A pair needs its
+    A shift's worth is its valley contrast: its value less the least on the way from zero, the less the less
+    of the view overlaps. A pair needs its
     sum and difference too; among those nearly as good as the best, the smallest cell is taken.
     """
     shifts, worth = _peaks(found, least=least, most=most)
@@ -122,7 +131,7 @@ def _peaks(found: Autocorrelation, *, least: float, most: float) -> tuple[np.nda
     peak = values[y, x]
     fine_x = _vertex(values[y, x - 1], peak, values[y, x + 1])
     fine_y = _vertex(values[y - 1, x], peak, values[y + 1, x])
-    worth = valley_contrast(found, np.stack([dx, dy], 1).astype(float))
+    worth = valley_contrast(found, np.stack([dx, dy], 1).astype(float)) * found.trust[y, x]
     best = np.argsort(-worth, kind="stable")[:_PEAKS]
     return np.stack([dx + fine_x, dy + fine_y], 1)[best], worth[best]
 

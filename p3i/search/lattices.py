@@ -75,7 +75,7 @@ def _grow_all(session: Session, pattern: Pattern, fits: list[Fit]) -> None:
             continue
         session.tell("refining", 0.3 + 0.5 * grown / _MOST_GROWN)
         fit = grow(session.evidence, pattern, proposal, generator=session.generator)
-        grown += 1
+        grown += fit is not None  # what cannot even be begun costs next to nothing
         _record(session, pattern, proposal, fit)
         if fit is None or int(fit.support.sum()) < _LEAST_CELLS:
             continue
