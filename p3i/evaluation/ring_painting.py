@@ -37,7 +37,7 @@ def painted(
     name = options.look or str(random.choice([*sorted(DOTS), *sorted(MARKS)]))
     look = _visible_look(name, random, stage.beneath(canvas, places_px[seen]))
     ends = _ends(layout, index)
-    budget = int(options.hidden * len(index))
+    budget = int(options.hidden * seen.sum())
     gone = _left_out(ends, random, budget=budget)
     sprites = []
     for i, j in index[~gone].tolist():

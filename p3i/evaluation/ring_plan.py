@@ -34,9 +34,10 @@ class RingOptions:
     """What scenes with rings are made of.
 
     `jitter` (0..1) is how much objects differ, `noise` that of the pixels, `clutter` how many things at most
-    lie about, `hidden` the largest share of objects that are left out or covered, `plates` the share of
-    scenes with a plate below the objects, `jpeg` that of scenes squeezed as JPEG. `size` None draws one from
-    480 to 900 pixels. `focals` gives a third of the scenes another lens (24 to 60 mm) than `focal_mm`.
+    lie about, `hidden` the largest share of objects that are left out or covered, `arcs` the share of single
+    rings that are open, `plates` that of scenes with a plate below the objects, `jpeg` that of scenes packed
+    as JPEG. `size` None draws one from 480 to 900 pixels. `focals` gives a third of the scenes another lens
+    (24 to 60 mm) than `focal_mm`.
     """
 
     size: Size | None = None
@@ -48,6 +49,7 @@ class RingOptions:
     noise: float = 0.015
     clutter: int = 6
     hidden: float = 0.15
+    arcs: float = 0.2
     plates: float = 0.55
     jpeg: float = 0.5
 

@@ -12,9 +12,6 @@ from p3i.evaluation.ring_painting import painted
 from p3i.evaluation.ring_plan import RingOptions, Staged, planned
 from p3i.evaluation.scene import Scene
 
-_ARCS = 0.2
-"""The share of rings that are open."""
-
 
 def ring_scene(seed: int, options: RingOptions | None = None, **changes: Any) -> Scene:
     """The ring of a seed under a random camera. `changes` are fields of RingOptions.
@@ -31,7 +28,7 @@ def ring_scene(seed: int, options: RingOptions | None = None, **changes: Any) ->
 
 def _plan(random: Random, options: RingOptions) -> Staged:
     """An open or closed ring; its count is drawn first, and evenly in its logarithm."""
-    is_arc = random.random() < _ARCS
+    is_arc = random.random() < options.arcs
     least = 10 if is_arc else 5
     slots = round(float(np.exp(random.uniform(np.log(least - 0.4), np.log(36.4)))))
     count = slots
