@@ -15,6 +15,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
 from p3i.paint import outlines, scene
+from p3i.paint.lens import bent, bent_points, straight_photo
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
@@ -134,8 +135,15 @@ def render(
         view = _view(program, options, camera, photo, around)
         if photo is not None and options.size is not None and not options.plane:
             photo = scaled(photo, options.size)
+        k1 = program.header.lens_k1 if program.header else None
+        if k1 and photo is not None and options.plane:
+            photo = straight_photo(photo, k1)
         layers = _layers(objects, view, options, photo=photo, pictures=pictures)
         centers_px, depth = view.project(objects.points)
+        if k1 and not options.plane and _canvas(program, options, photo) is not None:
+            ground = layers[:1] if photo is not None else ()  # the photo is bent already
+            layers = ground + tuple(bent(layer, view.size, k1) for layer in layers[len(ground) :])
+            centers_px, _ = bent_points(centers_px, view.size, k1)
     ground = layers[0] if photo is not None else None
     transparent = isinstance(ground, scene.Pixels) and ground.values.shape[2] == 4
     return RenderedPicture(

@@ -13,6 +13,7 @@ from p3i.interp.unroll import distinct, edges
 from p3i.search.cells import HALF_STEPS, contrast, sample_grid
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence, Level
+from p3i.search.lens import scaled, straightened
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
@@ -43,13 +44,17 @@ class Evaluation:
 def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation:
     """Score a program on a photo, whatever it draws.
 
-    The focal is that of the options, else the program's header, else the photo, else 35 mm. Raises
-    ProgramError where fewer than two of the program's objects lie in the photo.
+    The focal is that of the options, else the program's header, else the photo, else 35 mm; the lens is that
+    of the header. Raises ProgramError where fewer than two of the program's objects lie in the photo.
     """
     limit_threads(config.threads)
     header = program.header.focal_mm if program.header is not None else None
     given = None if config.focal_mm == "auto" else config.focal_mm
     focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
+    k1 = program.header.lens_k1 if program.header is not None else None
+    if k1:  # judged as it was found: on the photo freed of its lens
+        free = straightened(image, k1)
+        image, program, focal_mm = free.image, scaled(program, 1 / free.scale), focal_mm / free.scale
     evidence = Evidence(image, config, focal_mm)
     pattern = _without_doubles(compile(program))
     points, in_front = pattern.centers_px(size=image.size, focal_mm=focal_mm)
