@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from p3i.api import examples, read_image, render, score, synth
+    from p3i.api import examples, read_image, render, score, synth, trace
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
@@ -47,10 +47,11 @@ _HOMES = {
     "render": "p3i.api",
     "score": "p3i.api",
     "synth": "p3i.api",
+    "trace": "p3i.api",
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand", "examples",
+    "synth", "render", "score", "check", "format", "expand", "examples", "trace",
     "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",

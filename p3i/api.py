@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     import numpy as np
 
     from p3i.paint.draw import RenderedPicture
+    from p3i.paint.film import Film
     from p3i.search.score import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand", "examples",
+    "synth", "render", "score", "check", "format", "expand", "examples", "trace",
     "load", "loads", "dump", "dumps", "read_image",
 ]  # fmt: skip
 
@@ -100,6 +101,17 @@ def score(
     image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
     tree = program if isinstance(program, Program) else load(Path(program))
     return evaluate(image, tree, config or SearchConfig())
+
+
+def trace(trace: str | os.PathLike[str], *, image: str | os.PathLike[str] | None = None) -> "Film":
+    """The search that `p3i synth --trace` wrote down, as pictures over its photo.
+
+    `image` is the photo where the trace's own name of it does not lead there, or picks one search of several.
+    The result has `frames`, `notes` and `encode(kind)`. Raises FileError (with the line) and UsageError.
+    """
+    from p3i.paint.film import film_of
+
+    return film_of(Path(trace), image=None if image is None else os.fspath(image))
 
 
 def render(

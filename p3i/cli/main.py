@@ -31,6 +31,7 @@ COMMANDS: dict[str, Entry] = {
     "check": Entry("p3i.cli.check", "Report what is wrong, or odd, in programs."),
     "fmt": Entry("p3i.cli.fmt", "Rewrite programs in their canonical text."),
     "expand": Entry("p3i.cli.expand", "List the objects that a program draws."),
+    "trace": Entry("p3i.cli.trace", "Show a search as a moving picture."),
     "score": Entry("p3i.cli.score", "Say how well a program explains a photo."),
     "examples": Entry("p3i.cli.examples", "Draw scenes whose program is known, as a set to measure with."),
 }

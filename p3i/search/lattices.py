@@ -30,6 +30,8 @@ _LEAST_CELLS = 4
 _LAST_ROUNDS = 4
 # So many fits are worked out to programs before the search gives up.
 _MOST_FINISHED = 3
+# A proposal says nothing of its extent; the trace shows it so many steps to each side.
+_PROPOSED_STEPS = 6
 
 
 def find_lattices(session: Session) -> list[Answer]:
@@ -154,8 +156,8 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     score = score_of(measured.contrast)
     if session.config.extent == "image":
         layout = filling_layout(session.evidence, pattern, layout)
-    session.record("answer", cells=len(measured.index), score=score, worth=worth(measured))
     program = layout.program(from_zero=not session.config.strict)
+    session.record("candidate", program=program, score=score, worth=worth(measured))
     return Answer(program, "lattice", score, worth(measured), notes)
 
 
@@ -215,14 +217,11 @@ def _whole_multiple(steps: np.ndarray, of: np.ndarray) -> bool:
 def _record(session: Session, pattern: Pattern, proposal: Proposal, fit: Fit | None) -> None:
     if session.trace is None:
         return
-    lattice = proposal.lattice
-    session.record(
-        "proposal", rx=lattice.rx_deg, ry=lattice.ry_deg, basis=lattice.basis.tolist(),
-        origin=lattice.origin.tolist(), worth=proposal.worth, local=proposal.local,
-    )  # fmt: skip
-    if fit is not None:
-        found = Lattice.of(pattern, fit.theta)
-        session.record(
-            "fit", rx=found.rx_deg, ry=found.ry_deg, basis=found.basis.tolist(), origin=found.origin.tolist(),
-            cells=fit.index[fit.support].int().tolist(), score=fit.score, worth=worth(fit),
-        )  # fmt: skip
+    spread = (-_PROPOSED_STEPS, _PROPOSED_STEPS + 1)
+    told = Layout(proposal.lattice, spread, spread).program()
+    session.record("proposal", program=told, worth=proposal.worth, local=proposal.local)
+    if fit is not None and bool(fit.support.any()):
+        cells = fit.index[fit.support]
+        low, high = cells.min(0).values.int().tolist(), (cells.max(0).values.int() + 1).tolist()
+        found = Layout(Lattice.of(pattern, fit.theta), (low[0], high[0]), (low[1], high[1]))
+        session.record("fit", program=found.program(), score=fit.score, worth=worth(fit), cells=len(cells))

@@ -2,18 +2,21 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import torch
 
 from p3i.grammar.ast import Program
+from p3i.grammar.printer import format_program
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.result import StopReason, StructureFound
 
 Progress = Callable[[str, float], None]
 Trace = Callable[[Mapping[str, Any]], None]
+TRACE_VERSION = 1
+"""Of what `record` writes: the number in a trace's first record (p3i/paint/steps.py reads it)."""
 
 
 @dataclass(slots=True)
@@ -50,15 +53,25 @@ class Session:
             self.stopped = StopReason.TIME_UP
         return self.stopped is None
 
+    @property
+    def focal_is_free(self) -> bool:
+        """Whether the pattern may tell the focal: nobody stated it, or the pattern was asked for it."""
+        stated = self.config.focal_mm
+        return stated == "auto" or (stated is None and self.evidence.image.focal_mm is None)
+
     def tell(self, doing: str, share: float) -> None:
         """Report progress: what is being done, and the share of the whole that is done, 0..1."""
         if self.progress is not None:
             self.progress(doing, share)
 
     def record(self, step: str, **facts: Any) -> None:
-        """Write one step of the search into the trace."""
-        if self.trace is not None:
-            self.trace({"step": step, **facts})
+        """Write one step of the search into the trace; a `program` is written as its text."""
+        if self.trace is None:
+            return
+        program = facts.get("program")
+        if isinstance(program, Program):
+            facts["program"] = format_program(replace(program, header=None))
+        self.trace({"step": step, **facts})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

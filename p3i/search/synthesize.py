@@ -16,7 +16,7 @@ from p3i.search.result import (
     StopReason,
     SynthesisResult,
 )
-from p3i.search.session import Answer, Progress, Session, Trace
+from p3i.search.session import TRACE_VERSION, Answer, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
@@ -53,6 +53,8 @@ def synthesize(
         return result(None, hopeless)
     check_asked(config, image.size)
     session = Session(Evidence(image, config, focal_mm), config, progress, trace)
+    width, height = image.size.width, image.size.height
+    session.record("photo", width=width, height=height, focal=focal_mm, version=TRACE_VERSION)
     answers = _found(session) if config.lens is None else find_with_lens(session, _found)
     needed = needed_for(config)
     if config.focal_mm == "auto" and config.sketch is None and config.start is None:
@@ -60,10 +62,13 @@ def synthesize(
     good = [answer for answer in answers if answer.score >= needed]
     if not good:
         best = max((answer.score for answer in answers), default=0.0)
-        return result(None, session.stopped or why_not(config), score=best, needed=needed)
+        refused = result(None, session.stopped or why_not(config), score=best, needed=needed)
+        session.record("answer", program=None, score=best, reason=refused.reason)
+        return refused
     first = good[0]
     margin = first.worth - max((answer.worth for answer in answers if answer is not first), default=0.0)
     session.tell("done", 1.0)
+    session.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return result(
         first.program,
         session.stopped or StopReason.FOUND,
