@@ -145,7 +145,9 @@ def as_gif(pictures: Sequence[tuple[np.ndarray, int]]) -> bytes:
     # One palette for all frames keeps the photo still while the drawing moves.
     few = [pictures[place][0] for place in evenly(len(pictures), 5)]
     palette = Pil.fromarray(np.concatenate(few)).quantize(_COLOURS_IN_ALL)
-    first, *others = [Pil.fromarray(picture).quantize(palette=palette, dither=Pil.Dither.NONE) for picture, _ in pictures]
+    first, *others = [
+        Pil.fromarray(picture).quantize(palette=palette, dither=Pil.Dither.NONE) for picture, _ in pictures
+    ]
     stream = BytesIO()
     durations = [duration for _, duration in pictures]
     first.save(stream, "GIF", save_all=True, append_images=others, duration=durations, loop=0, disposal=1)
