@@ -4,10 +4,10 @@ import dataclasses
 import json
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -16,7 +16,7 @@ from p3i.cli import options, progress, report, search_options
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
 from p3i.search.config import EXTENTS, RECIPES, STRUCTURES, SearchConfig, default, sentence
-from p3i.search.result import StopReason, SynthesisResult
+from p3i.search.result import Candidate, StopReason, SynthesisResult
 
 
 class NumberOrWord(click.ParamType):
@@ -146,8 +146,6 @@ class Call:
             raise UsageError("--format jsonl writes one file or stdout, not a folder")
         if form == "p3p" and not into_folder and len(photos) > 1:
             raise UsageError(f"{len(photos)} photos need -o FOLDER/ or --format jsonl")
-        if form == "p3p" and not into_folder and config.top > 1:
-            raise UsageError("several candidates need -o FOLDER/ or --format jsonl")
         if given["max_px"] is not None and given["max_px"] < 1:
             raise UsageError(f"--max-px must be at least 1, not {given['max_px']}")
         return cls(
@@ -220,7 +218,7 @@ def _refuse_early(call: Call, targets: list[Path | None]) -> None:
     if call.folder is not None:
         files.make_folder(call.folder)
     wanted = [target for target in targets if target is not None]
-    if call.folder is not None and call.config.top > 1:
+    if call.config.top > 1:
         wanted += [_ranked(target, rank) for target in wanted for rank in range(2, call.config.top + 1)]
     wanted += [path for path in (call.output if call.as_jsonl else None, call.trace) if path is not None]
     for path in wanted:
@@ -285,13 +283,27 @@ def _write(call: Call, outcome: Outcome, target: Path | None, *, lines: Any) -> 
     layout = "table1" if call.config.strict else "python"
     best = format_program(outcome.result.program, layout=layout)
     if target is None:
-        click.echo(best.encode("utf-8"), nl=False)  # whatever the locale says
+        several = outcome.result.candidates if call.config.top > 1 else ()
+        text = best if len(several) < 2 else _one_after_another(several, layout=layout)
+        click.echo(text.encode("utf-8"), nl=False)  # whatever the locale says
         return
     with files.replacing(target, force=call.force) as stream:
         stream.write(best)
     for rank, candidate in enumerate(outcome.result.candidates[1 : call.config.top], start=2):
         with files.replacing(_ranked(target, rank), force=call.force) as stream:
             stream.write(format_program(candidate.program, layout=layout))
+
+
+def _one_after_another(candidates: Sequence[Candidate], *, layout: Literal["python", "table1"]) -> str:
+    """The programs of several candidates, each under a comment that says which it is."""
+    from p3i.grammar.printer import format_program
+
+    texts = []
+    for rank, candidate in enumerate(candidates, start=1):
+        what = f"{candidate.structure}, score {candidate.score:.4f}"
+        text = format_program(candidate.program, layout=layout)
+        texts.append(f"# candidate {rank} of {len(candidates)}: {what}\n{text}")
+    return "\n".join(texts)
 
 
 def _record(outcome: Outcome) -> dict[str, Any]:

@@ -5,6 +5,7 @@ import numpy as np
 from p3i.grammar.ast import Program
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
 from p3i.search.config import SearchConfig
+from p3i.search.distinct import distinct_answers
 from p3i.search.evidence import FINE, Evidence
 from p3i.search.focal import with_own_focal
 from p3i.search.lens import find_with_lens
@@ -59,6 +60,7 @@ def synthesize(
     needed = needed_for(config)
     if config.focal_mm == "auto" and config.sketch is None and config.start is None:
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
+    answers = distinct_answers(answers, size=image.size, focal_mm=focal_mm)
     good = [answer for answer in answers if answer.score >= needed]
     if not good:
         best = max((answer.score for answer in answers), default=0.0)

@@ -265,6 +265,18 @@ def test_the_progress_bar_stays_on_stderr_and_vanishes(photo) -> None:
     assert shown.rstrip().endswith("no regular pattern")
 
 
+def test_top_prints_programs_one_after_another_each_under_its_score(photo, capsys) -> None:
+    assert run(["synth", "--top", "2", photo("a.png")]) == 0
+    first, second = capsys.readouterr().out.split("# candidate 2 of 2: lattice, score 0.0600\n")
+    assert first.startswith("# candidate 1 of 2: lattice, score 0.1200\n# /// p3p\n")
+    import p3i
+
+    assert p3i.loads(first).world == lattice(12.0).world
+    assert p3i.loads(second).world == lattice(6.0).world
+    assert run(["synth", "--top", "2", "a.png", "-o", "b.p3p"]) == 0
+    assert p3i.load("b.2.p3p").world == lattice(6.0).world
+
+
 def test_top_lists_candidates(photo, capsys) -> None:
     assert run(["synth", "--format", "jsonl", "--top", "2", photo("a.png")]) == 0
     candidates = json.loads(capsys.readouterr().out)["candidates"]
@@ -334,7 +346,6 @@ def test_a_polygon_is_a_region_of_interest(photo, search) -> None:
         ["--time", "-1"],
         ["--time", "nan"],
         ["--top", "0"],
-        ["--top", "2"],
         ["--threads", "0"],
         ["--seed", "-1"],
         ["--max-px", "0"],
