@@ -25,11 +25,14 @@ from p3i.search.session import Session
 
 # Fillings scored in one go, and the most points that may take.
 _MOST_POINTS = 400_000
-# Survivors of the grid for each filling, rounds of climbing and steps tried in each.
-_SURVIVORS = 384
+# One survivor for so many points of the grid, within limits; rounds of climbing and steps tried in each.
+_POINTS_A_SURVIVOR = 150
+_FEWEST_SURVIVORS, _MOST_SURVIVORS = 48, 384
 _ROUNDS = 14
 _TRIES = 16
 _FIRST_REACH, _LAST_REACH = 0.10, 0.004
+# With a start for every number, the grid has so many times fewer points.
+_STARTED = 8
 # Gradient descent: steps, and the first one as a share of each number's range.
 _DESCENTS = 40
 _DESCENT_RATE = 0.004
@@ -55,13 +58,16 @@ def search_grid(
         z = torch.zeros(1, 0, dtype=torch.float64)
         score, setting = score_points(maps, filling, z, share=BLUR_SHARES[-1]).max(1)
         return [Found(filling, z[0], int(setting), float(score))]
-    z = samples(filling, budget, session.generator)
     start = start_values(filling)
+    if start is not None:  # near its goal already
+        budget = max(1, budget // _STARTED)
+    z = samples(filling, budget, session.generator)
     if start is not None:
         z = torch.cat([start[None], z])
     z = kept_within(filling, z)
     score = _scored(session, maps, filling, z, share=BLUR_SHARES[0])
-    z, score = _best(z, score, _SURVIVORS)
+    survivors = min(max(budget // _POINTS_A_SURVIVOR, _FEWEST_SURVIVORS), _MOST_SURVIVORS)
+    z, score = _best(z, score, survivors)
     score = score * distinct_share(filling, z)
     z, score = _climbed(session, maps, filling, z, score)
     z, score = _best(z, score, 4 * keep)

@@ -26,7 +26,7 @@ GRID = 2.0
 """The paper's grid size: degrees for the camera, program units for the lattice."""
 LOOKED_AT = 12_000
 """Points of the grid that are looked at, drawn at random by the seed."""
-DESCENTS = 48
+DESCENTS = 96
 """Points from which gradient descent starts, those of the least loss."""
 STEPS, RATE = 60, 0.2
 """Adam's steps and its learning rate, in degrees and units; the paper names neither."""

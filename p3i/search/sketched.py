@@ -15,6 +15,7 @@ from p3i.grammar.ast import Polar, Program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.compile import compile
 from p3i.interp.unroll import nest
+from p3i.search.centring import centred
 from p3i.search.climb import Found, distinct, search_grid
 from p3i.search.coarse import PointMaps, kept_within
 from p3i.search.curves import CurveFit, follow, measured
@@ -118,6 +119,7 @@ def _fitted(session: Session, found: Found) -> _Fit | None:
         now = moved
     last = _followed(session, now.filling, now.z, rounds=_LAST_ROUNDS)
     best = last if last is not None and last.mean >= now.mean else now
+    best = _centred(session, best)
     return _Fit(best, setting, best.mean)
 
 
@@ -142,6 +144,14 @@ def _followed(session: Session, filling: Filling, z: Tensor, *, rounds: int) -> 
         free = replace(free, z=torch.where(held, inside, free.z))
     again = measured(evidence, filling, kept_within(filling, free.z), focal_mm=evidence.focal_mm)
     return again if again is not None and again.mean > fit.mean else fit
+
+
+def _centred(session: Session, fit: CurveFit) -> CurveFit:
+    """The fit in the middle of its objects, if the limits allow it."""
+    moved = centred(session.evidence, fit)
+    inside = kept_within(fit.filling, _turned(fit.filling, moved.z))
+    again = measured(session.evidence, fit.filling, inside, focal_mm=fit.focal_mm)
+    return again if again is not None and again.mean > 0.8 * fit.mean else fit
 
 
 def _best_extent(session: Session, wide: Filling, now: CurveFit) -> tuple[Tensor, tuple[int, ...]] | None:
