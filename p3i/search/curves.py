@@ -28,8 +28,11 @@ _FOCAL_SPREAD = 0.35
 _MOST_TURN_DEG = 4.0
 _MOST_SHIFT = 0.4
 _MOST_ZOOM = 0.15
-# Patches of which less than this share is in sight are left out.
 _FEWEST = 3
+# A misfit of the objects' places beyond this one counts like it.
+_WORST = 3.0
+# What so many objects explain, chance explains too.
+_FEW = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +62,11 @@ class CurveFit:
         if len(self.contrast) == 0:
             return 0.0
         return float((self.contrast.clamp(min=0) + 0.5 * self.contrast.clamp(max=0)).mean())
+
+    @property
+    def quality(self) -> float:
+        """The mean contrast, less where the objects do not stand where the program draws."""
+        return self.mean * math.exp(-min(self.cost, _WORST))
 
 
 def measured(
@@ -116,7 +124,9 @@ def registered(evidence: Evidence, fit: CurveFit, *, free_focal: bool = False) -
     )
     if not bool(torch.isfinite(numbers).all()):
         return None
-    focal_mm = min(max(math.exp(float(numbers[-1])), FOCALS_MM[0]), FOCALS_MM[1]) if free_focal else fit.focal_mm
+    focal_mm = (
+        min(max(math.exp(float(numbers[-1])), FOCALS_MM[0]), FOCALS_MM[1]) if free_focal else fit.focal_mm
+    )
     residual = torch.einsum("nij,nj->ni", whiten, points_of(numbers) - targets)
     cost = float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())
     moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm)
@@ -132,11 +142,16 @@ def follow(evidence: Evidence, fit: CurveFit, *, rounds: int, free_focal: bool =
             break
         settled = abs(moved.mean - now.mean) < 0.003 and moved.cost > 0.98 * now.cost
         now = moved
-        if now.mean > best.mean:
+        if now.quality > best.quality:
             best = now
         if settled:
             break
     return best
+
+
+def curve_score(fit: CurveFit) -> float:
+    """The score, 0 to 1, of a program that was fitted: its quality, less what few objects get by chance."""
+    return max(0.0, fit.quality * (1 - _FEW / max(len(fit.contrast), _FEW)))
 
 
 def _whitening(matrix: Tensor, where: Frames) -> Tensor:

@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
+WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
+"""How much each cue of phase_cues speaks."""
 _STEP = 2  # samples between the phases that the rim is asked about
 _LEAST_CHANCE = 0.003  # probability of an alternative worth telling
 _NEAR = 0.13  # of a period: phases closer than this are the same answer
@@ -59,7 +60,7 @@ def find_phase(
     alike = look_alike(small, mask, matrix, basis, _middle(mask, matrix), support)
     if alike is None or alike.level <= 0 or not (alike.weights > 0).any():
         return None
-    worth = sum(_WEIGHTS[name] * cue for name, cue in phase_cues(alike).items())
+    worth = sum(WEIGHTS[name] * cue for name, cue in phase_cues(alike).items())
     return _phase(alike, basis, _middle(mask, matrix), np.asarray(worth))
 
 

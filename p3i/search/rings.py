@@ -1,20 +1,52 @@
-"""Rings on a photo: proposals, fits, which objects are there, and the program."""
+"""Rings on a photo: proposals, fits, where on the ring the objects sit, which are there, and the program."""
 
+from dataclasses import replace
+
+import numpy as np
 import torch
 
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.search.curves import CurveFit, follow, measured
-from p3i.search.evidence import Evidence
+from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, fillings, unknowns_of
-from p3i.search.propose.ring import RingProposal
+from p3i.search.propose.ring import RingProposal, ring_proposals
+from p3i.search.sector import Place, Ring, places
+from p3i.search.session import Answer, Session
+
+# So many proposals are fitted, and so many fits are finished.
+_MOST_FITTED = 8
+_MOST_FINISHED = 2
+# A fit of this quality ends the fitting of further proposals but those of other counts at the same place.
+_CERTAIN = 0.3
+# Objects with less contrast than this are not there.
+_PRESENT = 0.1
+# A ring is closed where at most this share of it lacks in one piece.
+_MOST_LACKING = 0.2
+_FEWEST = 4
 
 
-def ring_filling(count: int, first: int = 0, last: int | None = None) -> Filling:
-    """The sketch of a ring of `count` objects, of which those from `first` up to `last` are drawn."""
-    angle = f"360/{count}*j + ?a"
+def find_rings(session: Session) -> list[Answer]:
+    """The rings of a photo as finished programs, the most worth first."""
+    session.tell("turning", 0.82)
+    fits: list[CurveFit] = []
+    for proposal in ring_proposals(session.evidence)[:_MOST_FITTED]:
+        if not session.go_on():
+            break
+        fit = ring_fit(session, proposal)
+        if fit is None:
+            continue
+        fits.append(fit)
+        session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
+    fits.sort(key=lambda fit: -fit.quality)
+    answers = [answer for fit in fits[:_MOST_FINISHED] if (answer := _finished(session, fit)) is not None]
+    return sorted(answers, key=lambda answer: -answer.score)
+
+
+def ring_filling(count: int, *, drawn: int | None = None) -> Filling:
+    """The sketch of a ring of `count` objects; of `drawn` objects side by side where it is not closed."""
+    angle = f"360/{count}*j + ?a" if drawn is None else "?s*j + ?a"
     text = (
         "SetCameraPose(rx=??, ry=??)\n"
-        f"for j in range({first}, {count + first if last is None else last}):\n"
+        f"for j in range(0, {count if drawn is None else drawn}):\n"
         f"    Draw(x=?r*Cos({angle}) + ?x, y=?r*Sin({angle}) + ?y)\n"
     )
     sketch = parse_sketch(text)
@@ -22,8 +54,9 @@ def ring_filling(count: int, first: int = 0, last: int | None = None) -> Filling
     return next(fillings(sketch, unknowns_of(sketch), most_indices=1000, most_settings=1))
 
 
-def start(filling: Filling, proposal: RingProposal) -> torch.Tensor:
-    """The proposal as the sketch's free numbers."""
+def ring_fit(session: Session, proposal: RingProposal) -> CurveFit | None:
+    """The proposal refined by its objects' places."""
+    filling = ring_filling(proposal.count)
     values = {
         "camera.rx": proposal.rx_deg,
         "camera.ry": proposal.ry_deg,
@@ -32,11 +65,105 @@ def start(filling: Filling, proposal: RingProposal) -> torch.Tensor:
         "draw.x.offset.1": float(proposal.center[0]),
         "draw.y.offset.1": float(proposal.center[1]),
     }
+    first = measured(session.evidence, filling, _numbers(filling, values), focal_mm=proposal.focal_mm)
+    if first is None:
+        return None
+    fit = follow(session.evidence, first, rounds=4)
+    return follow(session.evidence, fit, rounds=3, free_focal=True) if session.focal_is_free else fit
+
+
+def _finished(session: Session, fit: CurveFit) -> Answer | None:
+    """The objects put where they sit, those that are there, and the program."""
+    best: tuple[float, CurveFit] | None = None
+    for place in places(session.evidence, _ring_of(session, fit))[:2]:
+        moved = _moved(session, fit, place)
+        if moved is None:
+            continue
+        found = _extended(session, moved)
+        score = curve_score(found)
+        if best is None or score > best[0]:
+            best = score, found
+    if best is None:
+        return None
+    score, found = best
+    stated = found.focal_mm == session.evidence.focal_mm
+    return Answer(
+        found.filling.program(found.z, ()),
+        "circular",
+        score,
+        score,
+        focal_mm=None if stated else round(found.focal_mm, 2),
+        focal_reason="" if stated else "estimated from the pattern, its ring taken as a circle",
+    )
+
+
+def _moved(session: Session, fit: CurveFit, place: Place) -> CurveFit | None:
+    """The fit with its draws on the objects, fitted once more."""
+    values = _values(fit)
+    values["draw.x.radius.1"] = place.radius
+    values["draw.x.angle.1"] += place.turn_deg
+    moved = measured(session.evidence, fit.filling, _numbers(fit.filling, values), focal_mm=fit.focal_mm)
+    if moved is None:
+        return None
+    return follow(session.evidence, moved, rounds=3, free_focal=session.focal_is_free)
+
+
+def _extended(session: Session, fit: CurveFit) -> CurveFit:
+    """The same ring, or the arc of it on which objects are."""
+    count = len(fit.filling.pattern.index)
+    there = np.zeros(count, int)  # 1 there, -1 not there, 0 out of sight
+    there[fit.index[:, 1].long().numpy()] = np.where(fit.contrast.numpy() > _PRESENT, 1, -1)
+    first, length = _longest_lack(there)
+    if length <= max(1, _MOST_LACKING * count) or count - length < _FEWEST:
+        return fit
+    values = _values(fit)
+    step = 360 / count
+    start = first + length
+    filling = ring_filling(count, drawn=count - length)
+    values["draw.x.angle.j"] = step
+    values["draw.x.angle.1"] += start * step
+    arc = measured(session.evidence, filling, _numbers(filling, values), focal_mm=fit.focal_mm)
+    if arc is None:
+        return fit
+    arc = follow(session.evidence, arc, rounds=2, free_focal=session.focal_is_free)
+    return replace(arc, cost=min(arc.cost, 5.0))
+
+
+def _longest_lack(there: np.ndarray) -> tuple[int, int]:
+    """Where the longest run without objects begins on the circle, and its length; 0 long if there is none.
+
+    Single objects within it do not end it where more are lacking on both sides.
+    """
+    count = len(there)
+    best = (0, 0, 0.0)
+    for first in range(count):
+        worth = 0.0
+        for length in range(1, count):
+            worth += {1: -2.0, -1: 1.0, 0: 0.0}[int(there[(first + length - 1) % count])]
+            if worth > best[2]:
+                best = (first, length, worth)
+    return best[0], best[1]
+
+
+def _ring_of(session: Session, fit: CurveFit) -> Ring:
+    values = _values(fit)
+    seen = fit.filling.pattern.image_from_plane(
+        fit.theta, size=session.evidence.image.size, focal_mm=fit.focal_mm
+    )
+    return Ring(
+        center=np.array([values["draw.x.offset.1"], values["draw.y.offset.1"]]),
+        radius=values["draw.x.radius.1"],
+        first_deg=values["draw.x.angle.1"],
+        step_deg=360 / len(fit.filling.pattern.index),
+        index=fit.index[:, 1].numpy(),
+        weights=fit.contrast.numpy().astype(float),
+        image_from_plane=seen.numpy(),
+    )
+
+
+def _values(fit: CurveFit) -> dict[str, float]:
+    return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
+
+
+def _numbers(filling: Filling, values: dict[str, float]) -> torch.Tensor:
     return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
-
-
-def ring_fit(evidence: Evidence, proposal: RingProposal) -> CurveFit | None:
-    """The proposal refined by its objects' places."""
-    filling = ring_filling(proposal.count)
-    first = measured(evidence, filling, start(filling, proposal), focal_mm=proposal.focal_mm)
-    return None if first is None else follow(evidence, first, rounds=5)

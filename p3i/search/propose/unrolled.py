@@ -101,8 +101,8 @@ def unroll(
     return Strip(*_features(strip, known), radii)
 
 
-def _features(lab: NDArray, known: NDArray) -> tuple[Floats, NDArray[np.bool_]]:
-    """Gradient strength and double angle of a strip [R, T, 3], freed of each row's mean: [3, R, T]."""
+def gradients(lab: NDArray) -> Floats:
+    """Gradient strength and double angle of unrolled colours [R, T, 3] whose ends meet: [3, R, T]."""
     smooth = cv2.GaussianBlur(np.pad(lab, ((0, 0), (4, 4), (0, 0)), mode="wrap"), (0, 0), 1.0)
     gx = 0.5 * (smooth[:, 5:-3] - smooth[:, 3:-5])
     inner = smooth[:, 4:-4]
@@ -110,9 +110,13 @@ def _features(lab: NDArray, known: NDArray) -> tuple[Floats, NDArray[np.bool_]]:
     gy[1:-1] = 0.5 * (inner[2:] - inner[:-2])
     squared = (gx * gx + gy * gy).sum(2)
     factor = squared**0.25 / (squared + 0.4**2)
-    values = np.stack(
-        [squared**0.25, (gx * gx - gy * gy).sum(2) * factor, 2 * (gx * gy).sum(2) * factor]
-    ).astype(np.float32)
+    values = [squared**0.25, (gx * gx - gy * gy).sum(2) * factor, 2 * (gx * gy).sum(2) * factor]
+    return np.stack(values).astype(np.float32)
+
+
+def _features(lab: NDArray, known: NDArray) -> tuple[Floats, NDArray[np.bool_]]:
+    """The gradients of a strip [R, T, 3] freed of each row's mean [3, R, T], and where they are known."""
+    values = gradients(lab)
     mask = cv2.erode(np.pad(known.astype(np.uint8), ((0, 0), (3, 3)), mode="wrap"), np.ones((3, 5)))
     mask = mask[:, 3:-3].astype(bool)
     mask[[0, -1]] = False
