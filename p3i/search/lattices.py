@@ -3,6 +3,7 @@
 import numpy as np
 
 from p3i.interp.pattern import Pattern
+from p3i.search.elsewhere import with_note_of_others
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit, follow, grow
 from p3i.search.lattice import Lattice, lattice_pattern, map_from_index
@@ -16,10 +17,10 @@ from p3i.search.session import Answer, Session
 # So many proposals of each kind are looked at, and so many fits that differ are grown in all.
 _MOST_PROPOSALS = 10
 _MOST_GROWN = 7
-# Fits of this worth are certain enough that only a better one could matter; after one more try without
-# one the search goes on to finish it.
+# Fits of this worth are certain enough that only a better one could matter; after two more tries without
+# one, of proposals at least half as promising as the best of their kind, the search goes on to finish it.
 _CERTAIN = 0.025
-_TRIES_WHEN_CERTAIN = 1
+_TRIES_WHEN_CERTAIN = 2
 # A runner-up is finished too where its worth is at least this share of the best.
 _RIVAL = 0.5
 # A pattern of n cells counts as if it had _FEW_CELLS fewer: the numbers and the mean cell take their part.
@@ -50,7 +51,8 @@ def find_lattices(session: Session) -> list[Answer]:
         session.stopped = StopReason.INTERRUPTED
         if fits and not answers:
             _finish_all(session, pattern, fits[:1], answers)
-    return sorted(answers, key=lambda answer: -answer.worth)
+    answers.sort(key=lambda answer: -answer.worth)
+    return with_note_of_others(session, pattern, fits, answers, finish=_finished)
 
 
 def worth(fit: Fit) -> float:
@@ -69,10 +71,14 @@ def _grow_all(session: Session, pattern: Pattern, fits: list[Fit]) -> None:
     windows = window_proposals(session.evidence)[:_MOST_PROPOSALS]
     session.tell("straightening", 0.1)
     views = straightened_proposals(session.evidence)[:_MOST_PROPOSALS]
+    most = {kind[0].local: kind[0].worth for kind in (views, windows) if kind}
     grown = idle = 0
     for proposal in _alternating(views, windows):
         if not session.go_on() or grown >= _MOST_GROWN:
             return
+        certain = max((worth(fit) for fit in fits), default=0.0) > _CERTAIN
+        if certain and proposal.worth < _RIVAL * most[proposal.local]:
+            continue
         if any(_explained(session.evidence, pattern, proposal, fit) for fit in fits):
             continue
         session.tell("refining", 0.3 + 0.5 * grown / _MOST_GROWN)
