@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from p3i.api import examples, read_image, render, score, synth, trace
+    from p3i.api import eval_set, examples, read_image, render, score, synth, trace
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
@@ -39,6 +39,7 @@ _HOMES = {
     "dump": "p3i.language",
     "dumps": "p3i.language",
     "examples": "p3i.api",
+    "eval_set": "p3i.api",
     "expand": "p3i.language",
     "format": "p3i.language",
     "load": "p3i.language",
@@ -51,7 +52,7 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand", "examples", "trace",
+    "synth", "render", "score", "check", "format", "expand", "examples", "trace", "eval_set",
     "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",

@@ -20,6 +20,7 @@ from p3i.search.result import Candidate, SynthesisResult
 if TYPE_CHECKING:
     import numpy as np
 
+    from p3i.evaluation.score_set import SetScore
     from p3i.paint.draw import RenderedPicture
     from p3i.paint.film import Film
     from p3i.search.score import Evaluation
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from p3i.vision.image import Image
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand", "examples", "trace",
+    "synth", "render", "score", "check", "format", "expand", "examples", "trace", "eval_set",
     "load", "loads", "dump", "dumps", "read_image",
 ]  # fmt: skip
 
@@ -132,6 +133,35 @@ def render(
     from p3i.paint.draw import render as draw
 
     return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
+
+
+def eval_set(
+    folder: str | os.PathLike[str],
+    config: SearchConfig | None = None,
+    *,
+    results: str | os.PathLike[str] | None = None,
+    jobs: int = 1,
+    only: str | None = None,
+    limit: int | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> "SetScore":
+    """Measure the search on the annotated set in `folder` (docs/evaluation.md).
+
+    `options` change `config` as in `synth`. With `results`, a file of the JSON lines that `synth` printed,
+    nothing is searched. `jobs` is the number of processes. Raises FileError and UsageError.
+    """
+    from p3i.evaluation.score_set import score_set
+
+    return score_set(
+        Path(folder),
+        dataclasses.replace(config or SearchConfig(), **options),
+        results=None if results is None else Path(results),
+        jobs=jobs,
+        only=only,
+        limit=limit,
+        progress=progress,
+    )
 
 
 def examples(

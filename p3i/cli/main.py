@@ -33,6 +33,7 @@ COMMANDS: dict[str, Entry] = {
     "expand": Entry("p3i.cli.expand", "List the objects that a program draws."),
     "trace": Entry("p3i.cli.trace", "Show a search as a moving picture."),
     "score": Entry("p3i.cli.score", "Say how well a program explains a photo."),
+    "eval": Entry("p3i.cli.eval", "Measure p3i on an annotated set of photos."),
     "examples": Entry("p3i.cli.examples", "Draw scenes whose program is known, as a set to measure with."),
 }
 """In the order of `p3i --help`: the main job first."""

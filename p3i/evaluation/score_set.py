@@ -1,0 +1,229 @@
+"""An annotated set scored: p3i over its photos (or answers made earlier), by photo and by structure."""
+
+import concurrent.futures
+import dataclasses
+import json
+import multiprocessing
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from p3i import api
+from p3i.errors import FileError, P3IError, UsageError
+from p3i.evaluation.measures import Measures, measure
+from p3i.evaluation.truth import STRUCTURES, Truth, read_truth
+from p3i.grammar.ast import Program
+from p3i.grammar.parser import parse
+from p3i.search.config import SearchConfig
+from p3i.search.record import answer_record, failure_record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One photo of a set: its measures, or the worst that there are with `error`, the reason for it."""
+
+    file: str
+    structure: str
+    pose_reliable: bool
+    measures: Measures
+    error: str = ""
+    seconds: float | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """The row as one flat object."""
+        told: dict[str, Any] = {"file": self.file, "structure": self.structure}
+        told |= {"pose_reliable": self.pose_reliable, **dataclasses.asdict(self.measures)}
+        told["seconds"] = self.seconds
+        return told | ({"error": self.error} if self.error else {})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetScore:
+    """A set scored: rows in its order, means by structure, and its cost (None for answers made earlier)."""
+
+    rows: tuple[Row, ...]
+    summary: Mapping[str, Mapping[str, float | None]]
+    wall: float | None = None
+    cpu: float | None = None
+    peak_mb: float | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it for a file."""
+        rows = [row.as_json() for row in self.rows]
+        return {
+            "summary": self.summary,
+            "rows": rows,
+            "wall": self.wall,
+            "cpu": self.cpu,
+            "peak_mb": self.peak_mb,
+        }
+
+
+def score_set(
+    folder: Path,
+    config: SearchConfig,
+    *,
+    results: Path | None = None,
+    jobs: int = 1,
+    only: str | None = None,
+    limit: int | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> SetScore:
+    """Score p3i with these options on a set, or, with `results`, a file of the JSON lines of `synth`.
+
+    `only` keeps the photos whose name contains it, `limit` so many of them. Photos without an answer count
+    with the worst measures. Raises FileError for a set or results that cannot be read, UsageError for counts
+    out of range and where nothing is left to score.
+    """
+    if jobs < 1 or (limit is not None and limit < 1):
+        raise UsageError("the number of jobs, and the limit, must be at least 1")
+    truths = [one for one in read_truth(folder) if only is None or only in one.file][:limit]
+    if not truths:
+        raise UsageError(f"no photo of {folder} has {only!r} in its name")
+    if results is not None:
+        answers = _read_results(results)
+        rows = [_row(truth, answers.get(Path(truth.file).name)) for truth in truths]
+        return SetScore(rows=tuple(rows), summary=summarise(rows))
+    begun = time.perf_counter()
+    records, cpu, peak = [], 0.0, 0.0
+    for place, (record, used, memory) in enumerate(_answers(folder, truths, config, jobs)):
+        records.append(record)
+        cpu, peak = cpu + used, max(peak, memory)
+        if progress is not None:
+            progress(f"{place + 1} of {len(truths)} photos", (place + 1) / len(truths))
+    rows = [_row(truth, record) for truth, record in zip(truths, records, strict=True)]
+    wall = time.perf_counter() - begun
+    return SetScore(rows=tuple(rows), summary=summarise(rows), wall=wall, cpu=cpu, peak_mb=peak)
+
+
+def summarise(rows: Sequence[Row]) -> dict[str, dict[str, float | None]]:
+    """Means over all rows and by structure; those called `answered` leave out photos without an answer."""
+    groups = {"all": list(rows)}
+    groups |= {name: [row for row in rows if row.structure == name] for name in STRUCTURES}
+    return {name: _means(group) for name, group in groups.items() if group}
+
+
+def _means(rows: Sequence[Row]) -> dict[str, float | None]:
+    posed = [row for row in rows if row.pose_reliable]
+    answered = [row for row in rows if not row.error]
+    pose = [row.measures.pose_deg for row in posed]
+
+    def mean(name: str, among: Iterable[Row]) -> float | None:
+        values = [getattr(row.measures, name) for row in among]
+        return _mean([value for value in values if value is not None])
+
+    return {
+        "n": len(rows),
+        "failed": len(rows) - len(answered),
+        "answered": len(answered) / len(rows),
+        "pose_mean_answered": mean("pose_deg", [row for row in answered if row.pose_reliable]),
+        "chamfer_answered": mean("chamfer", answered),
+        "pose_mean": mean("pose_deg", posed),
+        "pose_median": float(np.median(pose)) if pose else None,
+        "pose_l1": mean("pose_l1", posed),
+        "pose<2": _mean([value <= 2 for value in pose]),
+        "pose<5": _mean([value <= 5 for value in pose]),
+        **{name: mean(name, rows) for name in ("det_gt", "gt_det", "chamfer", "f1", "f1_free")},
+        "lattice_ok": mean("lattice_ok", rows),
+        "structure_ok": mean("structure_ok", rows),
+        "seconds": _mean([row.seconds for row in rows if row.seconds is not None]),
+    }
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return float(np.mean(values)) if values else None
+
+
+def _row(truth: Truth, record: Mapping[str, Any] | None) -> Row:
+    """The row of a photo from its record; any record that holds no readable program is a failure."""
+    said = record or {}
+    text, seconds = said.get("program"), said.get("seconds")
+    error = str(said.get("error") or "no answer")
+    seconds = float(seconds) if isinstance(seconds, int | float) else None
+    worst = Measures(lattice_ok=False if truth.structure == "lattice" else None)
+    found = parse(text) if isinstance(text, str) else None
+    if isinstance(found, Program):
+        try:
+            worst, error = measure(found, truth), ""
+        except P3IError as failure:  # a program that draws millions
+            error = str(failure)
+    elif found:
+        error = f"its program cannot be read: {found[0].message}"
+    return Row(
+        file=truth.file,
+        structure=truth.structure,
+        pose_reliable=truth.pose_reliable,
+        measures=worst,
+        error=error,
+        seconds=seconds,
+    )
+
+
+def _read_results(path: Path) -> dict[str, Mapping[str, Any]]:
+    """The records of a JSON Lines file by the photo's name; lines that are no record are passed over."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
+    found: dict[str, Mapping[str, Any]] = {}
+    for line in lines:
+        try:
+            record = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(record, dict) and isinstance(record.get("image"), str):
+            found[Path(record["image"]).name] = record
+    if not found:
+        raise FileError(f"{path} holds no answer of synth --format jsonl")
+    return found
+
+
+def _answers(
+    folder: Path, truths: Sequence[Truth], config: SearchConfig, jobs: int
+) -> Iterable[tuple[dict[str, Any], float, float]]:
+    """The records of the photos in order, each with CPU seconds and the process's peak memory in MB."""
+    photos = [_photo(folder, truth.file) for truth in truths]
+    if jobs == 1:
+        yield from (_answer(photo, config) for photo in photos)
+        return
+    # A fresh process each: torch and OpenCV do not survive a fork with their threads.
+    with concurrent.futures.ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(_answer, photos, [config] * len(photos))
+
+
+def _photo(folder: Path, file: str) -> Path:
+    """A photo's file: as the annotation names it, or in images/."""
+    direct = folder / file
+    return direct if direct.is_file() else folder / "images" / Path(file).name
+
+
+def _answer(photo: Path, config: SearchConfig) -> tuple[dict[str, Any], float, float]:
+    """Synthesize one photo; what goes wrong becomes a record too."""
+    begun, used = time.perf_counter(), time.process_time()
+    try:
+        result = api.synth(photo, config)
+        error, code = result.reason, 5
+    except P3IError as failure:
+        result, error, code = None, str(failure), failure.exit_code
+    except Exception as failure:  # a bug on one photo does not end the measurement of the others
+        result, error, code = None, f"{type(failure).__name__}: {failure}", 70
+    seconds = time.perf_counter() - begun
+    if result is not None and result.program is not None:
+        record = answer_record(result, image=photo.name, seconds=seconds)
+    else:
+        record = failure_record(image=photo.name, error=error, code=code, seconds=seconds)
+    return record, time.process_time() - used, _peak_mb()
+
+
+def _peak_mb() -> float:
+    """The most memory that this process held so far, in MB; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024 if sys.platform != "darwin" else 2**20)
