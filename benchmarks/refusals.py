@@ -1,26 +1,41 @@
-"""Scores of photos without a pattern: how many `p3i.synth` refuses, and which score separates them.
+"""Scores of pictures without a pattern and with one: what `p3i.synth` refuses, rightly and wrongly.
 
-python benchmarks/refusals.py                     # 210 crops of the photos that scikit-image ships
-python benchmarks/refusals.py --crops 30 PHOTOS   # fewer crops; then photos with a pattern, for comparison
+python benchmarks/refusals.py                          # 210 crops without a pattern, 100 pictures with one
+python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then photos with a pattern
+python benchmarks/refusals.py --out scores.json        # every score, by kind of pattern
 
-The crops are drawn from a seed, so every run sees the same. It needs scikit-image (the extra `bench`),
-but downloads nothing.
+Every family of the search (lattices, rings, ...) looks at every picture, and the best score that each reaches
+is kept, refused or not. The crops are drawn from a seed, so every run sees the same; a crop that shares more
+than half of their joint area with an earlier one of its photo is drawn anew. It needs scikit-image (the extra
+`bench`), but downloads nothing.
 """
 
 import argparse
+import dataclasses
+import json
 import sys
 import time
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import cv2
 import numpy as np
+import robustness
 
 import p3i
 from p3i.errors import P3IError
+from p3i.interp.camera import Camera
 from p3i.search.config import SearchConfig
+from p3i.search.evidence import Evidence
 from p3i.search.result import NEEDED
+from p3i.search.session import Answer, Session
+from p3i.search.sketches import FAMILIES
+from p3i.search.synthesize import focal_of
+from p3i.size import Size
 from p3i.vision.image import Image
+from p3i.vision.threads import limit_threads
 
 PHOTOS = (
     "astronaut.png",
@@ -50,26 +65,120 @@ SIDES_PX = (256, 640)
 THRESHOLDS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.18, 0.2, 0.25, 0.3, 0.35)
 
 
+MOST_SHARED = 0.5
+"""Crops of one photo share at most this part of the area that they cover together."""
+
+MILD = (
+    ("none", "-"),
+    ("blur", "1.5 px"),
+    ("jpeg", "quality 30"),
+    ("noise", "0.05"),
+    ("light", "1:3"),
+    ("occlusion", "20%"),
+    ("missing", "15%"),
+    ("looks", "jitter 0.7"),
+    ("area", "20% of the frame"),
+    ("tilt", "60-65 degrees"),
+)
+"""Harms of benchmarks/robustness.py, and levels, that a photo with a pattern may well have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scores:
+    """The best score of each family on one picture, 0 where it proposed nothing."""
+
+    name: str
+    pattern: bool
+    best: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def highest(self) -> float:
+        """The score by which the picture is answered or refused."""
+        return max(self.best.values(), default=0.0)
+
+
 def crops(count: int, seed: int) -> Iterator[tuple[str, Image]]:
-    """`count` crops with their names, in turn from every photo: place and sides (pixels) at random."""
-    try:
-        import skimage.data
-    except ImportError:
-        sys.exit("this benchmark needs scikit-image: pip install 'p3i[bench]'")
-    folder = Path(skimage.data.__file__).parent
+    """`count` crops with their names, in turn from every photo: place and sides (pixels) at random.
+
+    A photo that has no room for another distinct crop is passed over.
+    """
     random = np.random.default_rng(seed)
-    for number in range(count):
+    taken: dict[str, list[tuple[int, int, int, int]]] = {name: [] for name in PHOTOS}
+    full: set[str] = set()
+    number = made = 0
+    while made < count and len(full) < len(PHOTOS):
         name = PHOTOS[number % len(PHOTOS)]
-        photo = p3i.read_image(folder / name)
-        left = FLAG_PX if name.startswith("astronaut") else 0
-        rows, columns = photo.valid[:, left:].shape
+        number += 1
+        if name in full:
+            continue
+        photo = p3i.read_image(_folder() / name)
+        box = _distinct_box(photo, taken[name], random, left=FLAG_PX if name.startswith("astronaut") else 0)
+        if box is None:
+            full.add(name)
+            continue
+        taken[name].append(box)
+        made += 1
+        x, y, width, height = box
+        cut = (slice(y, y + height), slice(x, x + width))
+        image = Image(np.ascontiguousarray(photo.pixels[cut]), np.ascontiguousarray(photo.valid[cut]))
+        yield f"{Path(name).stem} {width}x{height}+{x}+{y}", image
+
+
+def _distinct_box(
+    photo: Image, taken: list[tuple[int, int, int, int]], random: np.random.Generator, *, left: int
+) -> tuple[int, int, int, int] | None:
+    """A new (x, y, width, height) beside those taken; None where 40 tries found no room."""
+    rows, columns = photo.valid[:, left:].shape
+    for _ in range(40):
         height, width = (int(random.integers(SIDES_PX[0], SIDES_PX[1] + 1)) for _ in range(2))
         height, width = min(height, rows), min(width, columns)
         y = int(random.integers(0, rows - height + 1))
         x = left + int(random.integers(0, columns - width + 1))
-        cut = (slice(y, y + height), slice(x, x + width))
-        image = Image(np.ascontiguousarray(photo.pixels[cut]), np.ascontiguousarray(photo.valid[cut]))
-        yield f"{Path(name).stem} {width}x{height}+{x}+{y}", image
+        if all(_shared((x, y, width, height), other) <= MOST_SHARED for other in taken):
+            return x, y, width, height
+    return None
+
+
+def _shared(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> float:
+    """The area that two boxes share, of what they cover together."""
+    across = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+    down = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+    both = max(0, across) * max(0, down)
+    return both / (a[2] * a[3] + b[2] * b[3] - both)
+
+
+def _folder() -> Path:
+    try:
+        import skimage.data
+    except ImportError:
+        sys.exit("this benchmark needs scikit-image: pip install 'p3i[bench]'")
+    return Path(skimage.data.__file__).parent
+
+
+def scenes(count: int) -> Iterator[tuple[str, Image]]:
+    """`count` rendered lattices, mildly spoilt in turn; seeds that benchmarks/robustness.py does not use."""
+    harms = robustness.harms()
+    for number in range(count):
+        harm, level = MILD[number % len(MILD)]
+        scene = harms[harm][level](100 + number // len(MILD))
+        yield f"scene {scene.seed} {harm} {level}", scene.image()
+
+
+def boards() -> Iterator[tuple[str, Image]]:
+    """The board that scikit-image ships, seen under eight cameras. (Its bricks lie in no lattice.)"""
+    size, plane = Size(640, 480), p3i.read_image(_folder() / "chessboard_GRAY.png").pixels
+    units = 130 / max(plane.shape[:2])  # of the plane, for a pixel of the board
+    middle = np.array([plane.shape[1] - 1, plane.shape[0] - 1]) / 2
+    plane_from_board = np.array([[units, 0, -units * middle[0]], [0, units, -units * middle[1]], [0, 0, 1.0]])
+    for number in range(8):
+        camera = Camera.from_normal((0.7 * np.cos(0.8 * number), 0.7 * np.sin(0.8 * number), 1.0))
+        matrix = camera.image_from_plane(size).numpy() @ plane_from_board
+        pixels = cv2.warpPerspective(
+            plane, matrix, (size.width, size.height), flags=cv2.INTER_LINEAR, borderValue=(0.5, 0.5, 0.5)
+        )
+        pixels = np.clip(np.asarray(pixels, np.float32), 0, 1)
+        yield f"board, camera {number}", Image(pixels, np.ones(pixels.shape[:2], bool))
 
 
 def photos(folder: Path) -> Iterator[tuple[str, Image]]:
@@ -81,39 +190,54 @@ def photos(folder: Path) -> Iterator[tuple[str, Image]]:
             print(f"{path.name}: {error}", file=sys.stderr)
 
 
-def measure(images: Iterable[tuple[str, Image]], config: SearchConfig) -> list[float]:
-    """The best score seen on each image, 0 where the search proposed nothing; a line for each.
+def measure(images: Iterable[tuple[str, Image]], config: SearchConfig, *, pattern: bool) -> list[Scores]:
+    """The best score of each family on each image; a line for each.
 
     An image on which the search breaks off is a bug: it is named and left out.
     """
-    scores: list[float] = []
+    found: list[Scores] = []
+    limit_threads(config.threads)
     for name, image in images:
         begun = time.process_time()
         try:
-            result = p3i.synth(image, config)
+            evidence = Evidence(image, config, focal_of(image, config)[0])
+            best = {
+                family.structure: _best(family.find(Session(evidence, config)))
+                for family in FAMILIES
+                if config.structure in ("auto", family.structure)
+            }
         except Exception as bug:
             print(f"{name:40} BUG {type(bug).__name__}: {bug}", flush=True)
             traceback.print_exc()
             continue
-        seconds = time.process_time() - begun
-        scores.append(result.score or 0.0)
-        said = "answered" if result.program is not None else result.stop.name.lower()
-        print(f"{name:40} {scores[-1]:.3f} {said:16} {seconds:.1f} s", flush=True)
-    return scores
+        seconds = round(time.process_time() - begun, 2)
+        found.append(Scores(name=name, pattern=pattern, best=best, seconds=seconds))
+        told = "  ".join(f"{structure} {score:.3f}" for structure, score in best.items())
+        said = "refused" if found[-1].highest < NEEDED else "answered"
+        print(f"{name:40} {told}  {said:8} {seconds:.1f} s", flush=True)
+    return found
 
 
-def summary(title: str, scores: Sequence[float]) -> None:
-    """Print how the scores are distributed, and the share that reaches each threshold."""
-    refused = sum(score < NEEDED for score in scores)
-    print(f"\n{title}: {len(scores)}, of which {refused} refused (a score below {NEEDED})")
-    places = (100, 99, 95, 90, 50, 10, 5, 1, 0)
-    values = np.percentile(scores, places)
-    print(
-        "percentile "
-        + "  ".join(f"{place}: {value:.3f}" for place, value in zip(places, values, strict=True))
-    )
-    shares = (f"{limit}: {np.mean(np.array(scores) >= limit):.1%}" for limit in THRESHOLDS)
-    print("reaching   " + "  ".join(shares) + "\n", flush=True)
+def _best(answers: Sequence[Answer]) -> float:
+    return round(max((answer.score for answer in answers), default=0.0), 4)
+
+
+def summary(title: str, found: Sequence[Scores]) -> None:
+    """Print how the scores are distributed, of each family and of the best of them."""
+    if not found:
+        return
+    refused = sum(scores.highest < NEEDED for scores in found)
+    print(f"\n{title}: {len(found)}, of which {refused} refused (a score below {NEEDED})")
+    columns = {structure: [scores.best[structure] for scores in found] for structure in found[0].best}
+    if len(columns) > 1:
+        columns["best"] = [scores.highest for scores in found]
+    places = (100, 99, 98, 95, 90, 50, 10, 5, 3, 1, 0)
+    for name, values in columns.items():
+        told = zip(places, np.percentile(values, places), strict=True)
+        print(f"{name:9} percentile " + "  ".join(f"{place}: {value:.3f}" for place, value in told))
+        shares = (f"{limit}: {np.mean(np.array(values) >= limit):.1%}" for limit in THRESHOLDS)
+        print(f"{name:9} reaching   " + "  ".join(shares))
+    print(flush=True)
 
 
 def main() -> None:
@@ -122,14 +246,29 @@ def main() -> None:
     )
     parser.add_argument("folder", nargs="?", type=Path, help="photos with a pattern, for comparison")
     parser.add_argument("--crops", type=int, default=210, help="how many crops without a pattern")
+    parser.add_argument("--scenes", type=int, default=84, help="how many rendered lattices, mildly spoilt")
+    parser.add_argument(
+        "--boards", action=argparse.BooleanOptionalAction, default=True, help="eight views of a board"
+    )
     parser.add_argument("--seed", type=int, default=0, help="the seed of the crops")
     parser.add_argument("--features", default="oriented", help="as of p3i synth")
+    parser.add_argument("--structure", default="auto", help="as of p3i synth")
+    parser.add_argument("--out", type=Path, help="a JSON file for every score")
     given = parser.parse_args()
-    config = SearchConfig(features=given.features)
-    if given.crops > 0:
-        summary("crops without a pattern", measure(crops(given.crops, given.seed), config))
-    if given.folder is not None:
-        summary("photos with a pattern", measure(photos(given.folder), config))
+    config = SearchConfig(features=given.features, structure=given.structure)
+    found: list[Scores] = []
+    sets: list[tuple[str, bool, Iterable[tuple[str, Image]]]] = [
+        ("crops without a pattern", False, crops(given.crops, given.seed)),
+        ("rendered lattices", True, scenes(given.scenes)),
+        ("a board", True, boards() if given.boards else ()),
+        ("photos with a pattern", True, photos(given.folder) if given.folder is not None else ()),
+    ]
+    for title, pattern, images in sets:
+        measured = measure(images, config, pattern=pattern)
+        summary(title, measured)
+        found += measured
+        if given.out is not None:
+            given.out.write_text(json.dumps([dataclasses.asdict(scores) for scores in found], indent=1))
 
 
 if __name__ == "__main__":
