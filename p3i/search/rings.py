@@ -1,7 +1,5 @@
 """Rings on a photo: proposals, fits, where on the ring the objects sit, which are there, and the program."""
 
-from dataclasses import replace
-
 import numpy as np
 import torch
 
@@ -17,11 +15,14 @@ _MOST_FITTED = 8
 _MOST_FINISHED = 2
 # A fit of this quality ends the fitting of further proposals but those of other counts at the same place.
 _CERTAIN = 0.3
-# Objects with less contrast than this are not there.
-_PRESENT = 0.1
+# Objects with less than this share of the plain ones' contrast are not there.
+_PRESENT = 0.4
 # A ring is closed where at most this share of it lacks in one piece.
 _MOST_LACKING = 0.2
 _FEWEST = 4
+# Growth looks this many places beyond an arc's ends, and goes on for so many rounds.
+_REACH = 3
+_MOST_GROWTHS = 8
 
 
 def find_rings(session: Session) -> list[Answer]:
@@ -109,40 +110,83 @@ def _moved(session: Session, fit: CurveFit, place: Place) -> CurveFit | None:
 
 
 def _extended(session: Session, fit: CurveFit) -> CurveFit:
-    """The same ring, or the arc of it on which objects are."""
+    """The ring as far as its objects go: closed, or an arc that grew from where the objects are plain.
+
+    A ring that was fitted under a pose or count a little off holds on a part of the circle only; that part,
+    fitted by itself, says where the next objects are.
+    """
     count = len(fit.filling.pattern.index)
-    there = np.zeros(count, int)  # 1 there, -1 not there, 0 out of sight
-    there[fit.index[:, 1].long().numpy()] = np.where(fit.contrast.numpy() > _PRESENT, 1, -1)
-    first, length = _longest_lack(there)
-    if length <= max(1, _MOST_LACKING * count) or count - length < _FEWEST:
+    first, length = _best_run(fit)
+    if length >= (1 - _MOST_LACKING) * count:
         return fit
     values = _values(fit)
     step = 360 / count
-    start = first + length
-    filling = ring_filling(count, drawn=count - length)
-    values["draw.x.angle.j"] = step
-    values["draw.x.angle.1"] += start * step
+    values |= {"draw.x.angle.j": step, "draw.x.angle.1": values["draw.x.angle.1"] + first * step}
+    arc = _arc(session, fit, values, max(length, _FEWEST))
+    for _ in range(_MOST_GROWTHS):
+        if arc is None:
+            return fit
+        values, drawn = _values(arc), len(arc.filling.pattern.index)
+        step = values["draw.x.angle.j"]
+        slots = round(360 / abs(step))
+        if drawn >= slots - 1 or slots > 60:
+            closed = _closed(session, arc, values, slots)
+            return closed if closed is not None and closed.quality > 0.7 * arc.quality else arc
+        values["draw.x.angle.1"] -= _REACH * step
+        filling = ring_filling(0, drawn=drawn + 2 * _REACH)
+        wider = measured(
+            session.evidence, filling, _numbers(filling, values), focal_mm=arc.focal_mm, side=arc.side
+        )
+        if wider is None:
+            return arc
+        first, length = _best_run(wider, closed=False)
+        if length <= drawn:
+            return arc
+        values["draw.x.angle.1"] += first * step
+        grown = _arc(session, wider, values, length)
+        if grown is None or grown.quality < 0.5 * arc.quality:
+            return arc
+        arc = grown
+    return arc
+
+
+def _arc(session: Session, fit: CurveFit, values: dict[str, float], drawn: int) -> CurveFit | None:
+    """The arc of `drawn` objects with these numbers, fitted with its step free."""
+    filling = ring_filling(0, drawn=drawn)
     arc = measured(session.evidence, filling, _numbers(filling, values), focal_mm=fit.focal_mm)
     if arc is None:
-        return fit
-    arc = follow(session.evidence, arc, rounds=2, free_focal=session.focal_is_free)
-    return replace(arc, cost=min(arc.cost, 5.0))
+        return None
+    return follow(session.evidence, arc, rounds=2, free_focal=session.focal_is_free)
 
 
-def _longest_lack(there: np.ndarray) -> tuple[int, int]:
-    """Where the longest run without objects begins on the circle, and its length; 0 long if there is none.
+def _closed(session: Session, fit: CurveFit, values: dict[str, float], slots: int) -> CurveFit | None:
+    """The whole ring of which an arc is nearly all."""
+    filling = ring_filling(slots)
+    ring = measured(session.evidence, filling, _numbers(filling, values), focal_mm=fit.focal_mm)
+    if ring is None:
+        return None
+    return follow(session.evidence, ring, rounds=3, free_focal=session.focal_is_free)
 
-    Single objects within it do not end it where more are lacking on both sides.
+
+def _best_run(fit: CurveFit, *, closed: bool = True) -> tuple[int, int]:
+    """The run of draws with most objects: its first index and its length; single lacks do not end it.
+
+    Draws out of sight neither help nor hurt. `closed`: the run may go on past the last index at the first.
     """
-    count = len(there)
-    best = (0, 0, 0.0)
+    count = len(fit.filling.pattern.index)
+    worth = np.zeros(count)
+    sure = float(fit.contrast.clamp(min=0).quantile(0.75))
+    worth[fit.index[:, 1].long().numpy()] = np.clip(fit.contrast.numpy() - _PRESENT * sure, -0.3 * sure, sure)
+    best, found = 0.0, (0, 0)
     for first in range(count):
-        worth = 0.0
-        for length in range(1, count):
-            worth += {1: -2.0, -1: 1.0, 0: 0.0}[int(there[(first + length - 1) % count])]
-            if worth > best[2]:
-                best = (first, length, worth)
-    return best[0], best[1]
+        if worth[first] <= 0:
+            continue
+        reach = count if closed else count - first
+        sums = np.cumsum(worth[(first + np.arange(reach)) % count])
+        last = int(sums.argmax())
+        if sums[last] > best:
+            best, found = float(sums[last]), (first, last + 1)
+    return found
 
 
 def _ring_of(session: Session, fit: CurveFit) -> Ring:
