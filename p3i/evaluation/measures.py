@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import torch
 
 from p3i.evaluation.truth import Ring, Truth
 from p3i.grammar.ast import Polar, Program
 from p3i.interp.camera import Camera, rotation
+from p3i.interp.lens import photo_from_straight
 from p3i.interp.unroll import distinct, nest, points
 from p3i.size import Size
 
@@ -161,6 +163,10 @@ def _seen_points(program: Program, camera: Camera, size: Size) -> Array:
     drawn = points(program)
     plane = np.array([drawn[place][:2] for place in distinct(drawn)], float).reshape(-1, 2)
     pixels = _through(camera.image_from_plane(size).numpy(), plane)
+    lens = program.header.lens_k1 if program.header is not None else None
+    if lens:  # the photo as it is, bent
+        bent, shown = photo_from_straight(torch.from_numpy(pixels), lens, size=size)
+        pixels = np.where(shown.numpy()[:, None], bent.numpy(), np.nan)
     with np.errstate(invalid="ignore"):
         inside = ((pixels >= 0) & (pixels <= (size.width - 1, size.height - 1))).all(1)
     return pixels[inside]

@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from p3i import api
 from p3i.errors import FileError, P3IError, UsageError
 from p3i.evaluation.measures import Measures, measure
 from p3i.evaluation.truth import STRUCTURES, Truth, read_truth
-from p3i.grammar.ast import Program
+from p3i.grammar.ast import Header, Program
 from p3i.grammar.parser import parse
+from p3i.grammar.printer import format_program
 from p3i.search.config import SearchConfig
-from p3i.search.record import answer_record, failure_record
+from p3i.search.synthesize import synthesize
+from p3i.vision.image import read_image
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,18 +206,21 @@ def _photo(folder: Path, file: str) -> Path:
 def _answer(photo: Path, config: SearchConfig) -> tuple[dict[str, Any], float, float]:
     """Synthesize one photo; what goes wrong becomes a record too."""
     begun, used = time.perf_counter(), time.process_time()
+    record: dict[str, Any] = {"image": photo.name, "program": None}
     try:
-        result = api.synth(photo, config)
-        error, code = result.reason, 5
+        image = read_image(photo)
+        result = synthesize(image, config)
+        if result.program is None:
+            record["error"] = result.reason
+        else:
+            canvas = (image.size.width, image.size.height)
+            header = Header(canvas=canvas, focal_mm=result.focal_mm, lens_k1=result.lens_k1)
+            record["program"] = format_program(dataclasses.replace(result.program, header=header))
     except P3IError as failure:
-        result, error, code = None, str(failure), failure.exit_code
+        record["error"] = str(failure)
     except Exception as failure:  # a bug on one photo does not end the measurement of the others
-        result, error, code = None, f"{type(failure).__name__}: {failure}", 70
-    seconds = time.perf_counter() - begun
-    if result is not None and result.program is not None:
-        record = answer_record(result, image=photo.name, seconds=seconds)
-    else:
-        record = failure_record(image=photo.name, error=error, code=code, seconds=seconds)
+        record["error"] = f"{type(failure).__name__}: {failure}"
+    record["seconds"] = time.perf_counter() - begun
     return record, time.process_time() - used, _peak_mb()
 
 
