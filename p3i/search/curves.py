@@ -103,8 +103,8 @@ def registered(evidence: Evidence, fit: CurveFit, *, free_focal: bool = False) -
     whiten = _whitening(matrix, where)
 
     def points_of(numbers: Tensor) -> Tensor:
-        theta = filling.theta(numbers[:-1])
-        seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[-1].exp())
+        theta = filling.theta(numbers[..., :-1])
+        seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[..., -1].exp())
         return project(seen, pattern.points_at(fit.index, theta))[0]
 
     start = torch.cat([fit.z, torch.tensor([math.log(fit.focal_mm)], dtype=torch.float64)])

@@ -25,6 +25,8 @@ _SHARE_NOISE = 0.02
 _PIXEL_NOISE = 0.25
 # Offsets beyond this many of those count less and less (a Cauchy weight).
 _ROBUST_SCALE = 2.0
+# The share of a limit by which numbers are nudged to tell derivatives.
+_NUDGE = 1e-4
 # An instance counts where its peak beats the rim of the search by this much.
 _LEAST_LEAD = 0.05
 
@@ -137,8 +139,10 @@ def fit_instances(
     inverse, cell = _index_from_map(level, pattern, theta, found.index)
     noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()
 
+    selector = torch.eye(len(theta), dtype=torch.float64)[places]
+
     def points_of(moving: Tensor) -> Tensor:
-        return sample_points(level, pattern, theta.index_put((places,), moving), found.index)[0]
+        return sample_points(level, pattern, theta + (moving - theta[places]) @ selector, found.index)[0]
 
     moved = robust_fit(
         points_of,
@@ -165,21 +169,21 @@ def robust_fit(
 ) -> Tensor:
     """Move numbers so that points fall on their targets: Gauss-Newton, with strays counting less.
 
-    `points_of` takes numbers [V] to points [N, 2] (torch.func goes through it), `start` [V] is where to
-    begin, `targets` [N, 2], `whiten` [N, 2, 2] takes a difference of points to one in units of its noise,
+    `points_of` takes numbers [..., V] to points [..., N, 2], `start` [V] is where to begin, `targets` [N, 2], `whiten` [N, 2, 2] takes a difference of points to one in units of its noise,
     `weights` [N], `limits` [V] is the most that a step may move each number. `prior` [V, 2], if given, holds
     a mean and a weight (1 / variance) for each number.
     """
-
-    def points_twice(moving: Tensor) -> tuple[Tensor, Tensor]:
-        points = points_of(moving)
-        return points, points.detach()
-
     moving = start
+    # Central differences, all numbers in one batch of the generator: a tenth of what dual numbers cost, and
+    # in double precision as good.
+    nudges = torch.diag(_NUDGE * limits)
+    nudges = torch.cat([torch.zeros_like(start)[None], nudges, -nudges])
     for _ in range(iterations):
-        jacobian, points = torch.func.jacfwd(points_twice, has_aux=True)(moving)
+        seen = points_of(moving + nudges)
+        points, (ahead, behind) = seen[0], seen[1:].chunk(2)
+        jacobian = ((ahead - behind) / (2 * _NUDGE)).permute(1, 2, 0)  # by a step of each number's limit
         residual = torch.einsum("nij,nj->ni", whiten, points - targets)
-        rows = torch.einsum("nij,njp->nip", whiten, jacobian * limits)
+        rows = torch.einsum("nij,njp->nip", whiten, jacobian)
         distance = residual.square().sum(1)
         weight = (weights / (1 + distance / _ROBUST_SCALE**2)).sqrt()
         a = (rows * weight[:, None, None]).reshape(-1, len(start))
