@@ -14,7 +14,7 @@ from p3i.search.fill import whole_program_sketch
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
 from p3i.search.session import Answer, Session
-from p3i.search.sketched import Effort, find_by_sketch, most_drawn
+from p3i.search.sketched import WALKED, find_by_sketch, most_drawn
 from p3i.search.sketches import FAMILIES
 from p3i.size import Size
 
@@ -97,7 +97,7 @@ def walk(session: Session) -> list[Answer]:
             continue
         if not session.go_on() or session.elapsed() > deadline:
             break
-        found = find_by_sketch(session, one.sketch, effort=Effort.WALK)[:2]
+        found = find_by_sketch(session, one.sketch, effort=WALKED)[:2]
         session.record(
             "sketch", name=one.name, bits=one.bits, score=max((a.score for a in found), default=0.0)
         )

@@ -1,8 +1,8 @@
 """Where the middle of the object is: what agreement between objects cannot say.
 
 Draws that all lie a little beside their objects look as alike as draws in their middles. The mean patch
-tells: what differs in it from the ground around is the object, and its middle is sought by mean shift. Then the
-program's lengths and angles, not its camera, are moved so that the draws fall there.
+tells: what differs in it from the ground around is the object, and its middle is sought by mean shift. Then
+the program's lengths and angles, not its camera, are moved so that the draws fall there.
 """
 
 from dataclasses import dataclass
@@ -51,6 +51,20 @@ def centred(evidence: Evidence, fit: CurveFit) -> CurveFit:
     return now
 
 
+def standing_out(evidence: Evidence, fit: CurveFit) -> float:
+    """How much the middle of the mean patch differs from the ground, against what lies around it.
+
+    Between the objects of a pattern patches look alike as well; there it is less than on the objects.
+    """
+    where = frames(fit.filling.pattern, fit.theta, fit.index, side=fit.side)
+    return _lead(_mean_patch(evidence, fit, where))
+
+
+def _lead(patch: _MeanPatch) -> float:
+    near = patch.offsets.norm(dim=1) < _WINDOW
+    return float(patch.saliency[near].mean()) / (float(patch.saliency[~near].mean()) + 1e-9)
+
+
 def _mean_patch(evidence: Evidence, fit: CurveFit, where: Frames) -> _MeanPatch:
     offsets = _WIDE * offsets_grid(_COUNT, samples_a_side=_COUNT).reshape(-1, 2)
     matrix = fit.filling.pattern.image_from_plane(fit.theta, size=evidence.image.size, focal_mm=fit.focal_mm)
@@ -69,8 +83,7 @@ def _mean_patch(evidence: Evidence, fit: CurveFit, where: Frames) -> _MeanPatch:
 
 def _middle(patch: _MeanPatch) -> Tensor | None:
     """The middle of what stands out, [2] in sides; None where nothing clearly does."""
-    near = patch.offsets.norm(dim=1) < _WINDOW
-    if float(patch.saliency[near].mean()) < _STANDS_OUT * float(patch.saliency[~near].mean()) + 1e-9:
+    if _lead(patch) < _STANDS_OUT:
         return None
     middle = torch.zeros(2, dtype=torch.float64)
     for _ in range(_STEPS):

@@ -6,16 +6,16 @@ numbers that a person bounded stay within their bounds all the way.
 """
 
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import torch
 from torch import Tensor
 
 from p3i.grammar.ast import Polar, Program
+from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.compile import compile
 from p3i.interp.unroll import nest
-from p3i.search.centring import centred
+from p3i.search.centring import centred, standing_out
 from p3i.search.climb import Found, distinct, search_grid
 from p3i.search.coarse import PointMaps, kept_within
 from p3i.search.curves import CurveFit, follow, measured
@@ -27,28 +27,42 @@ from p3i.search.fill import (
     unknowns_of,
     with_settings,
 )
-from p3i.search.patches import patch_contrast, spacing
+from p3i.search.patches import half_steps, patch_contrast, spacing
 from p3i.search.result import StructureFound
 from p3i.search.score import normalised_score, score_of
 from p3i.search.session import Answer, Session
 from p3i.vision.warp import in_frame
 
 
-class Effort(Enum):
-    """How hard to try: points of the grid in all, the least for each setting of the counts, fits."""
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How hard to try: points of the grid, the least of them for a setting of the counts, fits, rounds."""
 
-    WHOLE = (60_000, 2_000, 10)
-    WALK = (24_000, 600, 4)
+    points: int
+    least: int
+    fits: int
+    rounds: int
 
 
+BY_HAND = Effort(60_000, 2_000, 10, 2)
+"""For a sketch that a person wrote: after a round with a sure answer no other follows."""
+WALKED = Effort(24_000, 600, 4, 1)
+"""For one of many that are walked through."""
+
+# An answer of this score is sure enough to look no further.
+_ENOUGH = 0.35
 # Objects that a sketch may draw in the coarse search, and settings of its extents there.
 _MOST_INDICES, _MOST_SETTINGS = 64, 8
 # Settings of the extents that are weighed in the end.
 _ALL_SETTINGS = 4000
 # Rounds of registration.
 _ROUNDS, _LAST_ROUNDS = 3, 5
+# A pattern that was caught by its middle may grow by an object as often as this.
+_EXTENTS_TRIED = 10
 # An object is worth drawing from this share of the typical contrast on.
 _PRESENT = 0.35
+# Half a step on, the draws must stand out from the ground by this factor more.
+_MORE_OBJECT = 1.3
 _SHIFTS = [(1, 0), (-1, 0), (0, 1), (0, -1)]
 
 
@@ -61,7 +75,7 @@ class _Fit:
     worth: float
 
 
-def find_by_sketch(session: Session, sketch: Sketch, *, effort: Effort = Effort.WHOLE) -> list[Answer]:
+def find_by_sketch(session: Session, sketch: Sketch, *, effort: Effort = BY_HAND) -> list[Answer]:
     """Programs that fill the sketch, the best first; empty where no filling has objects in the photo."""
     size = session.evidence.image.size
     canvas = (size.width / size.unit_px, size.height / size.unit_px)
@@ -70,27 +84,40 @@ def find_by_sketch(session: Session, sketch: Sketch, *, effort: Effort = Effort.
     if not every:
         return []
     maps = PointMaps.of(session.evidence)
-    points, least, fitted = effort.value
-    budget = max(least, points // len(every))
+    answers: list[Answer] = []
+    for turn in range(effort.rounds):
+        answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
+        enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
+        if enough or not session.go_on():
+            break
+    return _different(sorted(answers, key=lambda answer: -answer.score))
+
+
+def _searched(
+    session: Session, maps: PointMaps, every: list[Filling], *, effort: Effort, done: float
+) -> list[Answer]:
+    """One look through the whole grid, with points of its own, and the fits of what was best there."""
+    budget = max(effort.least, effort.points // len(every))
+    share = 1 / effort.rounds
     found: list[Found] = []
     for place, filling in enumerate(every):
-        if not session.go_on():
+        if found and not session.go_on():
             break
-        session.tell("looking through the holes", 0.7 * place / len(every))
-        found += search_grid(session, maps, filling, budget=budget, keep=fitted)
-    found = distinct(maps, sorted(found, key=lambda one: -one.score))[:fitted]
+        session.tell("looking through the holes", done + share * 0.7 * place / len(every))
+        found += search_grid(session, maps, filling, budget=budget, keep=effort.fits)
+    found = distinct(maps, sorted(found, key=lambda one: -one.score))[: effort.fits]
     for one in found:
         session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
     answers: list[Answer] = []
     for place, one in enumerate(found):
         if answers and not session.go_on():
             break
-        session.tell("fitting to the objects", 0.7 + 0.3 * place / len(found))
+        session.tell("fitting to the objects", done + share * (0.7 + 0.3 * place / len(found)))
         fit = _fitted(session, one)
         if fit is not None:
             answers.append(_answer(session, fit))
-            session.record("fit", score=answers[-1].score, program=answers[-1].program)
-    return _different(sorted(answers, key=lambda answer: -answer.score))
+            session.record("fit", score=answers[-1].score, program=format_program(answers[-1].program))
+    return answers
 
 
 def most_drawn(sketch: Sketch) -> int:
@@ -106,9 +133,10 @@ def _fitted(session: Session, found: Found) -> _Fit | None:
     now = _followed(session, filling, found.z, rounds=_ROUNDS)
     if now is None:
         return None
+    now = _on_objects(session, now)
     settings = all_settings(filling, most=_ALL_SETTINGS)
     wide = with_settings(filling, settings)
-    for _ in range(4):
+    for _ in range(_EXTENTS_TRIED):
         chosen = _best_extent(session, wide, now)
         if chosen is None or (chosen[1] == setting and torch.equal(chosen[0], now.z)):
             break
@@ -144,6 +172,21 @@ def _followed(session: Session, filling: Filling, z: Tensor, *, rounds: int) -> 
         free = replace(free, z=torch.where(held, inside, free.z))
     again = measured(evidence, filling, kept_within(filling, free.z), focal_mm=evidence.focal_mm)
     return again if again is not None and again.mean > fit.mean else fit
+
+
+def _on_objects(session: Session, fit: CurveFit) -> CurveFit:
+    """The fit, or the same half a step on, where objects rather than the gaps between them are drawn."""
+    best, lead = fit, _MORE_OBJECT * standing_out(session.evidence, fit)
+    steps = half_steps(fit.filling.pattern).tolist()
+    for i, j in [*steps, *([-i, -j] for i, j in steps)]:
+        z = _shifted(fit.filling, fit.z, (i, j))
+        moved = None if z is None else measured(session.evidence, fit.filling, z, focal_mm=fit.focal_mm)
+        if moved is None or moved.mean < 0.7 * fit.mean:
+            continue
+        found = standing_out(session.evidence, moved)
+        if found > lead:
+            best, lead = moved, found
+    return best
 
 
 def _centred(session: Session, fit: CurveFit) -> CurveFit:
@@ -186,7 +229,7 @@ def _gains(session: Session, wide: Filling, z: Tensor, *, side: float, typical: 
     return gains
 
 
-def _shifted(filling: Filling, z: Tensor, shift: tuple[int, int]) -> Tensor | None:
+def _shifted(filling: Filling, z: Tensor, shift: tuple[float, float]) -> Tensor | None:
     """The numbers that draw at (i, j) what z draws at (i, j) + shift; None where the sketch cannot say it."""
     theta = filling.theta(z)
     paths = filling.pattern.paths
@@ -255,6 +298,4 @@ def _different(answers: list[Answer]) -> list[Answer]:
 
 
 def _text(filling: Filling, z: Tensor, setting: int) -> str:
-    from p3i.grammar.printer import format_program
-
     return format_program(filling.program(z, filling.settings[setting]))
