@@ -14,11 +14,11 @@ from p3i.errors import SketchError, UsageError
 from p3i.grammar.ast import Program
 from p3i.grammar.sketch import Sketch
 
-Structure = Literal["auto", "lattice"]
+Structure = Literal["auto", "lattice", "circular", "hybrid"]
 Extent = Literal["found", "image"]
 Recipe = Literal["p3i", "paper"]
 
-STRUCTURES: tuple[Structure, ...] = ("auto", "lattice")
+STRUCTURES: tuple[Structure, ...] = ("auto", "lattice", "circular", "hybrid")
 MOST_K1 = 0.4
 """Beyond this radial distortion no photo lens goes (p3i/interp/lens.py)."""
 
@@ -80,8 +80,6 @@ class SearchConfig:
     threads: Annotated[int, "Threads to compute with; one is fastest at these sizes."] = 1
 
     def __post_init__(self) -> None:
-        if self.structure in ("circular", "hybrid"):
-            raise UsageError(f"--structure {self.structure} is not there yet: this version finds lattices")
         _one_of("structure", self.structure, STRUCTURES)
         if self.recipe == "paper":  # one configuration, whole
             if self.features == default("features"):

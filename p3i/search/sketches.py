@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from p3i.search.lattices import find_lattices
 from p3i.search.result import StructureFound
+from p3i.search.rings import find_rings
 from p3i.search.session import Answer, Session
 
 
@@ -21,4 +22,4 @@ class Family:
     find: Callable[[Session], list[Answer]]
 
 
-FAMILIES: tuple[Family, ...] = (Family("lattice", find_lattices),)
+FAMILIES: tuple[Family, ...] = (Family("lattice", find_lattices), Family("circular", find_rings))

@@ -4,6 +4,7 @@ import numpy as np
 
 from p3i.grammar.ast import Program
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
+from p3i.search.choose import by_explained
 from p3i.search.config import SearchConfig
 from p3i.search.distinct import distinct_answers
 from p3i.search.evidence import FINE, Evidence
@@ -27,6 +28,8 @@ _LEAST_SIDE = 32
 _LEAST_KNOWN = 0.1
 # The spread of grey levels (0..1) below which a picture is flat.
 _LEAST_SPREAD = 0.004
+# Where a family has an answer of this score, no other kind of pattern could explain the photo better.
+_BEYOND_DOUBT = 0.3
 
 
 def synthesize(
@@ -97,19 +100,22 @@ def synthesize(
 
 def _found(session: Session) -> list[Answer]:
     """What every family that is asked for finds, the most worth first; an interrupt ends the search."""
-    answers: list[Answer] = []
+    answers: list[list[Answer]] = []
     try:
         asked = asked_for(session.config)
         if asked is not None:
-            answers += asked(session)
+            answers.append(asked(session))
         for family in FAMILIES if asked is None else ():
-            if session.config.structure in ("auto", family.structure):
-                answers += family.find(session)
+            beyond_doubt = any(answer.score > _BEYOND_DOUBT for found in answers for answer in found)
+            if session.config.structure == family.structure or (
+                session.config.structure == "auto" and not beyond_doubt
+            ):
+                answers.append(family.find(session))
         if session.config.exhaustive_s is not None:
-            answers += walk(session)
+            answers.append(walk(session))
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
-    return sorted(answers, key=lambda answer: -answer.worth)
+    return by_explained(session.evidence, answers)
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
