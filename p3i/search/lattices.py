@@ -29,6 +29,8 @@ _FEW_CELLS = 10
 _DOUBT = 0.05
 _LEAST_CELLS = 4
 _LAST_ROUNDS = 4
+# A fit of less worth is none: on rendered scenes and photos the fits of true patterns had five times as much.
+_LEAST_WORTH = 5e-4
 # So many fits are worked out to programs before the search gives up.
 _MOST_FINISHED = 3
 # A proposal says nothing of its extent; the trace shows it so many steps to each side.
@@ -107,6 +109,8 @@ def _finish_all(session: Session, pattern: Pattern, fits: list[Fit], answers: li
     """Work out fits, the best first, to programs until one is sure; the programs go into `answers`."""
     finished: list[Fit] = []
     for fit in fits:
+        if worth(fit) < _LEAST_WORTH:
+            break
         sure = max((answer.score for answer in answers), default=0.0) >= NEEDED
         if sure and len(answers) >= session.config.top and worth(fit) < _RIVAL * worth(finished[0]):
             break
