@@ -24,7 +24,8 @@ _SHARE_NOISE = 0.03
 _PIXEL_NOISE = 0.3
 # Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise.
 _FOCAL_SPREAD = 0.35
-# One step moves angles by at most so many degrees, lengths by this share of a patch, the focal by this factor.
+# One step moves angles by at most so many degrees, lengths by this share of a patch, the focal's logarithm
+# by this.
 _MOST_TURN_DEG = 4.0
 _MOST_SHIFT = 0.4
 _MOST_ZOOM = 0.15
@@ -72,7 +73,7 @@ class CurveFit:
 def measured(
     evidence: Evidence, filling: Filling, z: Tensor, *, focal_mm: float, side: float | None = None
 ) -> CurveFit | None:
-    """How well the objects of a filled sketch predict each other; None where fewer than three are in sight."""
+    """How well the objects of a filled sketch predict each other; None for fewer than three in sight."""
     theta = filling.theta(z)
     pattern = filling.pattern
     if side is None:

@@ -169,9 +169,10 @@ def robust_fit(
 ) -> Tensor:
     """Move numbers so that points fall on their targets: Gauss-Newton, with strays counting less.
 
-    `points_of` takes numbers [..., V] to points [..., N, 2], `start` [V] is where to begin, `targets` [N, 2], `whiten` [N, 2, 2] takes a difference of points to one in units of its noise,
-    `weights` [N], `limits` [V] is the most that a step may move each number. `prior` [V, 2], if given, holds
-    a mean and a weight (1 / variance) for each number.
+    `points_of` takes numbers [..., V] to points [..., N, 2], `start` [V] is where to begin, `targets` [N, 2],
+    `whiten` [N, 2, 2] takes a difference of points to one in units of its noise, `weights` [N], `limits` [V]
+    is the most that a step may move each number. `prior` [V, 2], if given, holds a mean and a weight
+    (1 / variance) for each number.
     """
     moving = start
     # Central differences, all numbers in one batch of the generator: a tenth of what dual numbers cost, and

@@ -1,9 +1,9 @@
 """Where on its ring an object sits: the common sector of a ring, and the place in it that stands out.
 
 That a ring repeats says nothing of the radius and the angle at which its objects lie: every circle about the
-centre repeats as well. As with lattices (phase.py), what tells is looked at in the common cell: here a sector,
-unrolled so that it is as wide as it is high. First the radius at which most of the drawing repeats, then the
-middle of what is drawn there.
+centre repeats as well. As with lattices (phase.py), what tells is looked at in the common cell: here a
+sector, unrolled so that it is as wide as it is high. First the radius at which most of the drawing repeats,
+then the middle of what is drawn there.
 """
 
 import math

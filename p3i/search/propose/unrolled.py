@@ -151,7 +151,7 @@ def best_rows(strip: Strip) -> list[Rows]:
 
 
 def likeness(strip: Strip, count: int) -> float:
-    """How much a narrow strip looks like `count` equal things: neighbours up to three steps, less half steps."""
+    """How much a narrow strip looks like `count` equal things: up to three steps on, less half steps."""
     inner, both = (table.sum(0) for table in _autocorrelation(strip))
     ncc = inner / np.maximum(both, 1e-3 * both[0] + 1e-9)
     period = _ANGLES / count
@@ -161,7 +161,7 @@ def likeness(strip: Strip, count: int) -> float:
 
 
 def _autocorrelation(strip: Strip) -> tuple[NDArray, NDArray]:
-    """By the shift, [R, T] both: the inner product of each row with itself, and the energy of what overlaps."""
+    """By the shift, [R, T] both: the inner product of each row with itself, and the energy that overlaps."""
     spectrum = np.fft.rfft(strip.values, axis=2)
     inner = np.fft.irfft((np.abs(spectrum) ** 2).sum(0), n=_ANGLES, axis=1)
     mask = np.fft.rfft(strip.known.astype(np.float32), axis=1)
