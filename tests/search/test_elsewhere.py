@@ -1,0 +1,41 @@
+"""Two patterns on one photo: the dominant one is the answer, and says where the other lies."""
+
+import re
+
+import numpy as np
+from truth import SMALL, pose_error_deg, small_scene
+
+from p3i.search.config import SearchConfig
+from p3i.search.synthesize import synthesize
+from p3i.vision.image import Image
+
+LEFT, RIGHT = 3, 18
+
+
+def side_by_side() -> Image:
+    """The left half of one scene and the right half of another, whose planes differ."""
+    pixels = small_scene(LEFT).pixels.copy()
+    half = SMALL.width // 2
+    pixels[:, half:] = small_scene(RIGHT).pixels[:, half:]
+    return Image(pixels.astype(np.float32) / 255, np.ones(pixels.shape[:2], bool))
+
+
+def test_another_plane_is_told_of_with_its_place() -> None:
+    result = synthesize(side_by_side(), SearchConfig(structure="lattice"))
+    assert result.program is not None
+    of_left = pose_error_deg(result.program, small_scene(LEFT).program)
+    of_right = pose_error_deg(result.program, small_scene(RIGHT).program)
+    assert min(of_left, of_right) < 3
+    said = re.compile(r"another plane carries a pattern, around \((\d+), (\d+)\)")
+    told = [said.fullmatch(note) for note in result.notes]
+    place = next((match for match in told if match), None)
+    assert place is not None, result.notes
+    assert (int(place[1]) > SMALL.width / 2) == (of_left < of_right), "it lies on the other side"
+    corners = np.array(result.region)
+    assert (corners[:, 0].mean() < SMALL.width / 2) == (of_left < of_right)
+
+
+def test_of_a_single_pattern_nothing_is_told() -> None:
+    result = synthesize(small_scene(LEFT).image(), SearchConfig(structure="lattice"))
+    assert result.program is not None
+    assert not any("another" in note for note in result.notes)
