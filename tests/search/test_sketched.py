@@ -81,7 +81,7 @@ def test_a_sketch_without_a_family_finds_camera_and_objects(kind: str) -> None:
     result, truth = filled(kind), scene(kind)
     assert pose_error_deg(result, truth) < 2.0
     assert len(result.centers) == len(truth.centers_px)
-    assert center_errors(result, truth).max() < 0.1
+    assert center_errors(result, truth).max() < 0.06
     assert result.structure == STRUCTURES[kind]
 
 
