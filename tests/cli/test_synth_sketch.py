@@ -64,7 +64,8 @@ def test_a_start_is_refined(photo: Path, capsys: pytest.CaptureFixture[str]) -> 
         ),
         ("SetCameraPose(rx=??, ry=0)\nfor j in range(0, 3):\n    Draw(x=9*j, y=2)\n", 4, "draws 3 objects"),
         (
-            "SetCameraPose(rx=0, ry=0)\nfor j in range(0, 8):\n    Draw(x=??(4, 5)*j + 10, y=??(-1, 0)*j - 30)\n",
+            "SetCameraPose(rx=0, ry=0)\nfor j in range(0, 8):\n"
+            "    Draw(x=??(4, 5)*j + 10, y=??(-1, 0)*j - 30)\n",
             5,
             "the sketch does not fit this photo (best 0.",
         ),
