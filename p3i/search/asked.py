@@ -93,7 +93,7 @@ def walk(session: Session) -> list[Answer]:
     answers: list[Answer] = []
     covered = {family.structure for family in FAMILIES}
     for one in sketches_by_length():
-        if one.family in covered:
+        if one.family in covered or session.config.structure not in ("auto", one.structure):
             continue
         if not session.go_on() or session.elapsed() > deadline:
             break

@@ -14,6 +14,7 @@ from p3i.search.cells import HALF_STEPS, contrast, sample_grid
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence, Level
 from p3i.search.lens import scaled, straightened
+from p3i.search.patches import patch_contrast, spacing
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
@@ -69,8 +70,14 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
     """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`."""
     index = pattern.index[seen].double()
     index = index[:: len(index) // MOST_JUDGED + 1]
-    side = _cell_px(evidence, pattern, index)
     half_steps = _half_steps(pattern)
+    if len(half_steps) < len(HALF_STEPS):  # one loop sweeps no cells: patches about the draws are compared
+        side = spacing(pattern, pattern.theta)
+        mm = evidence.focal_mm
+        return score_of(
+            patch_contrast(evidence, pattern, pattern.theta, index, side=side, focal_mm=mm).contrast
+        )
+    side = _cell_px(evidence, pattern, index)
     return max(
         score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=half_steps))
         for level in (evidence.level_for(side, name=name) for name in judging_features(evidence.config))

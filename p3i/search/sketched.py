@@ -27,9 +27,9 @@ from p3i.search.fill import (
     unknowns_of,
     with_settings,
 )
-from p3i.search.patches import half_steps, patch_contrast, spacing
+from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
-from p3i.search.score import normalised_score, score_of
+from p3i.search.score import normalised_score
 from p3i.search.session import Answer, Session
 from p3i.vision.warp import in_frame
 
@@ -268,17 +268,7 @@ def program_score(session: Session, program: Program) -> float:
     seen = front & in_frame(points, evidence.image.size)
     if int(seen.sum()) < 4:
         return 0.0
-    if structure_of(program) == "lattice" and nest(program).for_i and nest(program).for_j:
-        return normalised_score(evidence, pattern, seen)
-    found = patch_contrast(
-        evidence,
-        pattern,
-        pattern.theta,
-        pattern.index[seen].double(),
-        side=spacing(pattern, pattern.theta),
-        focal_mm=evidence.focal_mm,
-    )
-    return score_of(found.contrast)
+    return normalised_score(evidence, pattern, seen)
 
 
 def structure_of(program: Program) -> StructureFound:
