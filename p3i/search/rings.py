@@ -15,6 +15,9 @@ _MOST_FITTED = 8
 _MOST_FINISHED = 2
 # A fit of this quality ends the fitting of further proposals but those of other counts at the same place.
 _CERTAIN = 0.3
+# So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
+_MOST_PLACES = 2
+_MUCH_BETTER = 4.0
 # Objects with less than this share of the plain ones' contrast are not there.
 _PRESENT = 0.4
 # A ring is closed where at most this share of it lacks in one piece.
@@ -75,18 +78,16 @@ def ring_fit(session: Session, proposal: RingProposal) -> CurveFit | None:
 
 def _finished(session: Session, fit: CurveFit) -> Answer | None:
     """The objects put where they sit, those that are there, and the program."""
-    best: tuple[float, CurveFit] | None = None
-    for place in places(session.evidence, _ring_of(session, fit))[:2]:
+    fit = _extended(session, fit)
+    # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
+    found, score = fit, curve_score(fit)
+    for rank, place in enumerate(places(session.evidence, _ring_of(session, fit))[:_MOST_PLACES]):
         moved = _moved(session, fit, place)
         if moved is None:
             continue
-        found = _extended(session, moved)
-        score = curve_score(found)
-        if best is None or score > best[0]:
-            best = score, found
-    if best is None:
-        return None
-    score, found = best
+        score = max(score, curve_score(moved))
+        if rank == 0 or moved.mean > _MUCH_BETTER * found.mean:
+            found = moved
     stated = found.focal_mm == session.evidence.focal_mm
     return Answer(
         found.filling.program(found.z, ()),
@@ -198,7 +199,7 @@ def _ring_of(session: Session, fit: CurveFit) -> Ring:
         center=np.array([values["draw.x.offset.1"], values["draw.y.offset.1"]]),
         radius=values["draw.x.radius.1"],
         first_deg=values["draw.x.angle.1"],
-        step_deg=360 / len(fit.filling.pattern.index),
+        step_deg=values.get("draw.x.angle.j", 360 / len(fit.filling.pattern.index)),
         index=fit.index[:, 1].numpy(),
         weights=fit.contrast.numpy().astype(float),
         image_from_plane=seen.numpy(),

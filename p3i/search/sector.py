@@ -32,7 +32,7 @@ _LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
 # The object's middle lies this close to the radius where most repeats, in sector sides.
-_NEAR = 0.17
+_NEAR = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
