@@ -91,3 +91,17 @@ def test_a_wrong_header_is_an_error_at_its_line(line: str, said: str) -> None:
 def test_a_comment_beside_a_statement_never_becomes_a_header() -> None:
     with pytest.raises(p3i.ProgramError, match="above the first statement"):
         p3i.loads(BODY.replace("ry=2)\n", "ry=2) # /// p3p\n# ///\n"))
+
+
+def test_the_lens_is_read_and_written() -> None:
+    program = p3i.loads(BLOCK.replace("# focal = 28\n", "# focal = 28\n# lens_k1 = -0.08\n") + BODY)
+    assert program.header is not None and program.header.lens_k1 == -0.08
+    bent = dataclasses.replace(program.header, lens_k1=0.1, lines=())
+    assert "# lens_k1 = 0.1" in header_lines(bent)
+    assert p3i.loads(p3i.format(dataclasses.replace(program, header=bent))).header == bent
+
+
+@pytest.mark.parametrize("k1", ["0.4", "-1", '"barrel"', "true", "nan"])
+def test_a_lens_that_cannot_be_is_refused(k1: str) -> None:
+    text = BLOCK.replace("# focal = 28\n", f"# lens_k1 = {k1}\n") + BODY
+    assert [found.code for found in p3i.check(text)] == ["P118"]
