@@ -90,17 +90,22 @@ def walk(session: Session) -> list[Answer]:
     """Programs of the enumerated sketches without a family, the shortest first, while time lasts."""
     assert session.config.exhaustive_s is not None
     deadline = session.elapsed() + session.config.exhaustive_s
-    answers: list[Answer] = []
     covered = {family.structure for family in FAMILIES}
-    for one in sketches_by_length():
-        if one.family in covered or session.config.structure not in ("auto", one.structure):
-            continue
-        if not session.go_on() or session.elapsed() > deadline:
+    asked = session.config.structure
+    ahead = [one for one in sketches_by_length() if one.family not in covered]
+    ahead = [one for one in ahead if asked in ("auto", one.structure)]
+    answers: list[Answer] = []
+    for place, one in enumerate(ahead):
+        left = deadline - session.elapsed()
+        if not session.go_on() or left <= 0:
             break
-        found = find_by_sketch(session, one.sketch, effort=WALKED)[:2]
-        session.record(
-            "sketch", name=one.name, bits=one.bits, score=max((a.score for a in found), default=0.0)
-        )
+        # Each gets an even share of the time that is left: a sketch with many counts takes no other's.
+        limit = dataclasses.replace(session.config, time_s=left / (len(ahead) - place))
+        inner = Session(session.evidence, limit, trace=session.trace)
+        session.tell(f"trying {one.name}", place / len(ahead))
+        found = find_by_sketch(inner, one.sketch, effort=WALKED)[:2]
+        best = max((answer.score for answer in found), default=0.0)
+        session.record("sketch", name=one.name, bits=one.bits, score=best)
         answers += found
     return answers
 

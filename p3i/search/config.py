@@ -125,7 +125,8 @@ class SearchConfig:
             raise SketchError(place="the sketch", reason="nothing in it is left to be found", mend=mend)
         if self.exhaustive_s is not None and not self.exhaustive_s > 0:
             raise UsageError(f"the time must be more than 0 seconds, not {self.exhaustive_s:g}")
-        if asked and self.structure not in ("auto", "lattice" if asked[0] == "recipe paper" else "auto"):
+        alone = {"sketch": ("auto",), "start": ("auto",), "recipe paper": ("auto", "lattice")}
+        if asked and self.structure not in alone.get(asked[0], STRUCTURES):
             raise UsageError(f"--{asked[0]} and --structure {self.structure} contradict each other")
         if asked and asked[0] in ("sketch", "start") and self.extent == "image":
             raise UsageError(f"--{asked[0]} says itself which objects are drawn: leave out --extent image")
