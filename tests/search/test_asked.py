@@ -1,0 +1,58 @@
+"""What is searched when a person asks for something else than the families."""
+
+import pytest
+
+import p3i
+from p3i.evaluation.program_scenes import program_scene
+from p3i.grammar.sketch import Sketch, parse_sketch
+from p3i.search import asked
+from p3i.search.config import SearchConfig
+from p3i.search.evidence import Evidence
+from p3i.search.result import NEEDED, StopReason
+from p3i.search.session import Session
+from p3i.size import Size
+
+ROW = "SetCameraPose(rx=-30, ry=5)\nfor j in range(0, 8):\n    Draw(x=9*j - 30, y=2*j)\n"
+
+
+def sketch(text: str) -> Sketch:
+    found = parse_sketch(text)
+    assert isinstance(found, Sketch), found
+    return found
+
+
+def test_without_a_wish_the_families_are_asked() -> None:
+    assert asked.asked_for(SearchConfig()) is None
+    assert asked.asked_for(SearchConfig(exhaustive_s=3)) is None
+    assert asked.why_not(SearchConfig()) is StopReason.NO_PATTERN
+    assert asked.needed_for(SearchConfig()) == NEEDED
+
+
+def test_a_sketch_a_start_and_a_recipe_take_the_place_of_the_families() -> None:
+    holes = sketch(ROW.replace("rx=-30", "rx=??"))
+    for config in (SearchConfig(sketch=holes), SearchConfig(start=p3i.loads(ROW))):
+        assert asked.asked_for(config) is not None
+        assert asked.why_not(config) is StopReason.NO_FIT
+        assert asked.needed_for(config) == NEEDED
+    assert asked.needed_for(SearchConfig(recipe="paper")) == 0
+
+
+def test_the_focal_in_the_header_of_a_sketch_counts() -> None:
+    text = "# /// p3p\n# version = 1\n# focal = 50.0\n# ///\n" + ROW.replace("rx=-30", "rx=~-30")
+    image = program_scene(p3i.loads(ROW), 0, size=Size(240, 180)).image()
+    assert p3i.synth(image, sketch=sketch(text)).focal_mm == 50
+    assert p3i.synth(image, sketch=sketch(text)).focal_source == "header"
+    assert p3i.synth(image, sketch=sketch(text), focal_mm=28).focal_mm == 28
+
+
+def test_the_walk_tries_the_shortest_sketches_that_no_family_covers(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[str] = []
+    monkeypatch.setattr(asked, "find_by_sketch", lambda session, sketch, effort: [])
+    image = program_scene(p3i.loads(ROW), 0, size=Size(160, 120)).image()
+    config = SearchConfig(exhaustive_s=60)
+    session = Session(
+        Evidence(image, config, 35.0), config, trace=lambda step: tried.append(str(step.get("name")))
+    )
+    assert asked.walk(session) == []
+    assert tried.index("row") < tried.index("spiral") < tried.index("spiral with a phase")
+    assert "lattice" not in tried
