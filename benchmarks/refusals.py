@@ -61,12 +61,15 @@ drawings, and what is smaller than the smallest crop."""
 FLAG_PX = 110
 """The left part of the astronaut's photo holds a flag, whose stars and stripes are a pattern."""
 
-SIDES_PX = (256, 640)
+SIDES_PX = (176, 640)
 THRESHOLDS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.18, 0.2, 0.25, 0.3, 0.35)
 
 
 MOST_SHARED = 0.5
 """Crops of one photo share at most this part of the area that they cover together."""
+
+MOST_OF_ONE = 24
+"""Crops that one photo gives at most, or the largest would give half of all."""
 
 MILD = (
     ("none", "-"),
@@ -110,6 +113,8 @@ def crops(count: int, seed: int) -> Iterator[tuple[str, Image]]:
     while made < count and len(full) < len(PHOTOS):
         name = PHOTOS[number % len(PHOTOS)]
         number += 1
+        if len(taken[name]) >= MOST_OF_ONE:
+            full.add(name)
         if name in full:
             continue
         photo = p3i.read_image(_folder() / name)
@@ -128,9 +133,9 @@ def crops(count: int, seed: int) -> Iterator[tuple[str, Image]]:
 def _distinct_box(
     photo: Image, taken: list[tuple[int, int, int, int]], random: np.random.Generator, *, left: int
 ) -> tuple[int, int, int, int] | None:
-    """A new (x, y, width, height) beside those taken; None where 40 tries found no room."""
+    """A new (x, y, width, height) beside those taken; None where 200 tries found no room."""
     rows, columns = photo.valid[:, left:].shape
-    for _ in range(40):
+    for _ in range(200):
         height, width = (int(random.integers(SIDES_PX[0], SIDES_PX[1] + 1)) for _ in range(2))
         height, width = min(height, rows), min(width, columns)
         y = int(random.integers(0, rows - height + 1))
