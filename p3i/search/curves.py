@@ -32,8 +32,10 @@ _MOST_ZOOM = 0.15
 _FEWEST = 3
 # A misfit of the objects' places beyond this one counts like it.
 _WORST = 3.0
-# What so many objects explain, chance explains too.
+# What so many objects explain, chance explains too, ...
 _FEW = 3
+# ... and so much agreement is found on photos without a pattern.
+_CHANCE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,8 +153,13 @@ def follow(evidence: Evidence, fit: CurveFit, *, rounds: int, free_focal: bool =
 
 
 def curve_score(fit: CurveFit) -> float:
-    """The score, 0 to 1, of a program that was fitted: its quality, less what few objects get by chance."""
-    return max(0.0, fit.quality * (1 - _FEW / max(len(fit.contrast), _FEW)))
+    """The score, 0 to 1, of a program that was fitted: its quality, less what few objects get by chance.
+
+    On any photo some ring can be found that agrees a little; that much is taken off, so that one limit serves
+    all structures (docs/benchmarks.md says what it was calibrated on).
+    """
+    sure = fit.quality * (1 - _FEW / max(len(fit.contrast), _FEW))
+    return max(0.0, (sure - _CHANCE) / (1 - _CHANCE))
 
 
 def _whitening(matrix: Tensor, where: Frames) -> Tensor:

@@ -31,6 +31,8 @@ _REACH = 1.55
 _LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
+# How much the profile speaks beside the cues of phase.py.
+_PROFILE = 4.0
 # The object's middle lies this close to the radius where most repeats, in sector sides.
 _NEAR = 0.1
 
@@ -98,7 +100,8 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
         if profile[row] < _LEAST_PEAK * profile[peaks].max():
             break
         rows = slice(row - half, row + half)
-        down, turn = _middle(sectors, ring, np.asarray(template[:, rows], np.float32), rows)
+        cell = np.asarray(template[:, rows], np.float32)
+        down, turn = _middle(sectors, ring, cell, rows, profile[rows] / profile[row])
         radius = float(np.interp(row + down, np.arange(len(profile)), sectors.radii))
         found.append(Place(radius, turn * ring.step_deg, float(profile[row])))
     return found
@@ -126,7 +129,9 @@ def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
     return Sectors(np.asarray(values, np.float32), known, radii)
 
 
-def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tuple[float, float]:
+def _middle(
+    sectors: Sectors, ring: Ring, template: Floats, rows: slice, profile: Array
+) -> tuple[float, float]:
     """The object's middle in a sector: samples down from the middle row, and turn in steps (-1/2 to 1/2).
 
     The cues take the cell for a torus, which it is along the arc; so only rows near the middle are asked.
@@ -140,7 +145,7 @@ def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tupl
         "parts": parts(median),
         "texture": concentration((template**2).sum(0)),
     }
-    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items())
+    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items()) + _PROFILE * profile[:, None]
     down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
     worth = np.where(np.abs(down)[:, None] < _NEAR, worth, -np.inf)
     y, x = divmod(int(np.argmax(worth)), _SIDE)
