@@ -1,5 +1,7 @@
 """Rings on a photo: proposals, fits, where on the ring the objects sit, which are there, and the program."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 
@@ -7,6 +9,7 @@ from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, fillings, unknowns_of
 from p3i.search.propose.ring import RingProposal, ring_proposals
+from p3i.search.result import StructureFound
 from p3i.search.sector import Place, Ring, places
 from p3i.search.session import Answer, Session
 
@@ -28,21 +31,49 @@ _REACH = 3
 _MOST_GROWTHS = 8
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundRing:
+    """A ring with its draws on its objects, and the score of its program."""
+
+    fit: CurveFit
+    score: float
+
+
 def find_rings(session: Session) -> list[Answer]:
     """The rings of a photo as finished programs, the most worth first."""
-    session.tell("turning", 0.82)
-    fits: list[CurveFit] = []
-    for proposal in ring_proposals(session.evidence)[:_MOST_FITTED]:
-        if not session.go_on():
-            break
-        fit = ring_fit(session, proposal)
-        if fit is None:
-            continue
-        fits.append(fit)
-        session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
-    fits.sort(key=lambda fit: -fit.quality)
-    answers = [answer for fit in fits[:_MOST_FINISHED] if (answer := _finished(session, fit)) is not None]
-    return sorted(answers, key=lambda answer: -answer.score)
+    return [answer_of(session, ring.fit, "circular", ring.score) for ring in found_rings(session)]
+
+
+def found_rings(session: Session) -> tuple[FoundRing, ...]:
+    """The rings of a photo, the best first; computed once in a search, for all that start from rings."""
+    if session.rings is None:
+        session.tell("turning", 0.82)
+        fits: list[CurveFit] = []
+        for proposal in ring_proposals(session.evidence)[:_MOST_FITTED]:
+            if not session.go_on():
+                break
+            fit = ring_fit(session, proposal)
+            if fit is None:
+                continue
+            fits.append(fit)
+            session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
+        fits.sort(key=lambda fit: -fit.quality)
+        rings = [_finished(session, fit) for fit in fits[:_MOST_FINISHED]]
+        session.rings = tuple(sorted(rings, key=lambda ring: -ring.score))
+    return session.rings
+
+
+def answer_of(session: Session, fit: CurveFit, structure: StructureFound, score: float) -> Answer:
+    """A fitted program as an answer, with its own focal where that is not the one stated."""
+    stated = fit.focal_mm == session.evidence.focal_mm
+    return Answer(
+        fit.filling.program(fit.z, ()),
+        structure,
+        score,
+        score,
+        focal_mm=None if stated else round(fit.focal_mm, 2),
+        focal_reason="" if stated else "estimated from the pattern, its ring taken as a circle",
+    )
 
 
 def ring_filling(count: int, *, drawn: int | None = None) -> Filling:
@@ -69,15 +100,15 @@ def ring_fit(session: Session, proposal: RingProposal) -> CurveFit | None:
         "draw.x.offset.1": float(proposal.center[0]),
         "draw.y.offset.1": float(proposal.center[1]),
     }
-    first = measured(session.evidence, filling, _numbers(filling, values), focal_mm=proposal.focal_mm)
+    first = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=proposal.focal_mm)
     if first is None:
         return None
     fit = follow(session.evidence, first, rounds=4)
     return follow(session.evidence, fit, rounds=3, free_focal=True) if session.focal_is_free else fit
 
 
-def _finished(session: Session, fit: CurveFit) -> Answer | None:
-    """The objects put where they sit, those that are there, and the program."""
+def _finished(session: Session, fit: CurveFit) -> FoundRing:
+    """The ring as far as it goes, its draws put where the objects sit."""
     fit = _extended(session, fit)
     # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
     found, score = fit, curve_score(fit)
@@ -88,23 +119,15 @@ def _finished(session: Session, fit: CurveFit) -> Answer | None:
         score = max(score, curve_score(moved))
         if rank == 0 or moved.mean > _MUCH_BETTER * found.mean:
             found = moved
-    stated = found.focal_mm == session.evidence.focal_mm
-    return Answer(
-        found.filling.program(found.z, ()),
-        "circular",
-        score,
-        score,
-        focal_mm=None if stated else round(found.focal_mm, 2),
-        focal_reason="" if stated else "estimated from the pattern, its ring taken as a circle",
-    )
+    return FoundRing(found, score)
 
 
 def _moved(session: Session, fit: CurveFit, place: Place) -> CurveFit | None:
     """The fit with its draws on the objects, fitted once more."""
-    values = _values(fit)
+    values = values_of(fit)
     values["draw.x.radius.1"] = place.radius
     values["draw.x.angle.1"] += place.turn_deg
-    moved = measured(session.evidence, fit.filling, _numbers(fit.filling, values), focal_mm=fit.focal_mm)
+    moved = measured(session.evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=fit.focal_mm)
     if moved is None:
         return None
     return follow(session.evidence, moved, rounds=3, free_focal=session.focal_is_free)
@@ -120,14 +143,14 @@ def _extended(session: Session, fit: CurveFit) -> CurveFit:
     first, length = _best_run(fit)
     if length >= (1 - _MOST_LACKING) * count:
         return fit
-    values = _values(fit)
+    values = values_of(fit)
     step = 360 / count
     values |= {"draw.x.angle.j": step, "draw.x.angle.1": values["draw.x.angle.1"] + first * step}
     arc = _arc(session, fit, values, max(length, _FEWEST))
     for _ in range(_MOST_GROWTHS):
         if arc is None:
             return fit
-        values, drawn = _values(arc), len(arc.filling.pattern.index)
+        values, drawn = values_of(arc), len(arc.filling.pattern.index)
         step = values["draw.x.angle.j"]
         slots = round(360 / abs(step))
         if drawn >= slots - 1 or slots > 60:
@@ -136,7 +159,7 @@ def _extended(session: Session, fit: CurveFit) -> CurveFit:
         values["draw.x.angle.1"] -= _REACH * step
         filling = ring_filling(0, drawn=drawn + 2 * _REACH)
         wider = measured(
-            session.evidence, filling, _numbers(filling, values), focal_mm=arc.focal_mm, side=arc.side
+            session.evidence, filling, numbers_of(filling, values), focal_mm=arc.focal_mm, side=arc.side
         )
         if wider is None:
             return arc
@@ -148,13 +171,13 @@ def _extended(session: Session, fit: CurveFit) -> CurveFit:
         if grown is None or grown.quality < 0.5 * arc.quality:
             return arc
         arc = grown
-    return arc
+    return fit if arc is None else arc
 
 
 def _arc(session: Session, fit: CurveFit, values: dict[str, float], drawn: int) -> CurveFit | None:
     """The arc of `drawn` objects with these numbers, fitted with its step free."""
     filling = ring_filling(0, drawn=drawn)
-    arc = measured(session.evidence, filling, _numbers(filling, values), focal_mm=fit.focal_mm)
+    arc = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
     if arc is None:
         return None
     return follow(session.evidence, arc, rounds=2, free_focal=session.focal_is_free)
@@ -163,7 +186,7 @@ def _arc(session: Session, fit: CurveFit, values: dict[str, float], drawn: int) 
 def _closed(session: Session, fit: CurveFit, values: dict[str, float], slots: int) -> CurveFit | None:
     """The whole ring of which an arc is nearly all."""
     filling = ring_filling(slots)
-    ring = measured(session.evidence, filling, _numbers(filling, values), focal_mm=fit.focal_mm)
+    ring = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
     if ring is None:
         return None
     return follow(session.evidence, ring, rounds=3, free_focal=session.focal_is_free)
@@ -191,7 +214,7 @@ def _best_run(fit: CurveFit, *, closed: bool = True) -> tuple[int, int]:
 
 
 def _ring_of(session: Session, fit: CurveFit) -> Ring:
-    values = _values(fit)
+    values = values_of(fit)
     seen = fit.filling.pattern.image_from_plane(
         fit.theta, size=session.evidence.image.size, focal_mm=fit.focal_mm
     )
@@ -206,9 +229,11 @@ def _ring_of(session: Session, fit: CurveFit) -> Ring:
     )
 
 
-def _values(fit: CurveFit) -> dict[str, float]:
+def values_of(fit: CurveFit) -> dict[str, float]:
+    """The numbers of a fit by the names of their unknowns, such as draw.x.radius.1."""
     return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
 
 
-def _numbers(filling: Filling, values: dict[str, float]) -> torch.Tensor:
+def numbers_of(filling: Filling, values: dict[str, float]) -> torch.Tensor:
+    """The numbers of a filling [F] in its order."""
     return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)

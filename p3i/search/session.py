@@ -24,7 +24,7 @@ class Session:
     """The photo's evidence, the options, the clock, and where progress and steps are told.
 
     `stopped` says why the search was cut short, if it was; who proposes and refines looks at `go_on()` in
-    between, and then finishes what it has.
+    between, and then finishes what it has. `rings` keeps what rings.py found, for the families that share it.
     """
 
     evidence: Evidence
@@ -32,6 +32,7 @@ class Session:
     progress: Progress | None = None
     trace: Trace | None = None
     stopped: StopReason | None = None
+    rings: tuple[Any, ...] | None = None
     _begun: float = field(default_factory=time.monotonic)
     _generator: torch.Generator | None = None
 
