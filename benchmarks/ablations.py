@@ -37,6 +37,7 @@ from p3i.search import autocorrelation as by_shifts
 from p3i.search import evidence, register
 
 Replacement = tuple[str, Callable[..., Any]]
+Rows = dict[tuple[str, str], dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +174,7 @@ COLUMNS = (
 
 
 def measured(photo: Path, truth: Truth, configuration: Configuration) -> dict[str, Any]:
-    """One search: the photo's measures (the worst without an answer), why none, its score, its CPU seconds."""
+    """One search: the photo's measures (the worst without an answer), why none, its score, CPU seconds."""
     begun = time.process_time()
     found, error, score = Measures(lattice_ok=False), "", None
     try:
@@ -190,7 +191,7 @@ def measured(photo: Path, truth: Truth, configuration: Configuration) -> dict[st
     return {"measures": told, "error": error, "score": score, "cpu": time.process_time() - begun}
 
 
-def table(rows: dict[tuple[str, str], dict[str, Any]], names: Sequence[str], truths: Sequence[Truth]) -> str:
+def table(rows: Rows, names: Sequence[str], truths: Sequence[Truth]) -> str:
     """The Markdown table over the photos that every configuration has searched."""
     done = [truth for truth in truths if all((name, truth.file) in rows for name in names)]
     lines = [
@@ -233,11 +234,12 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=CONFIGURATIONS, metavar="NAME", help="configurations")
     parser.add_argument("--rows", type=Path, help="JSON lines: written as measured, and read to go on")
     given = parser.parse_args()
-    names = given.only or list(CONFIGURATIONS)
+    names: list[str] = given.only or list(CONFIGURATIONS)
+    written: Path | None = given.rows
     truths = [one for one in read_truth(given.set) if one.structure == "lattice"][:: given.every]
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
-    if given.rows is not None and given.rows.is_file():
-        for line in given.rows.read_text().splitlines():
+    rows: Rows = {}
+    if written is not None and written.is_file():
+        for line in written.read_text().splitlines():
             told = json.loads(line)
             rows[told["configuration"], told["file"]] = told
     try:
@@ -247,11 +249,11 @@ def main() -> None:
             for name in names:
                 if (name, truth.file) in rows:
                     continue
-                told = {"configuration": name, "file": truth.file}
+                told: dict[str, Any] = {"configuration": name, "file": truth.file}
                 told |= measured(_photo(given.set, truth), truth, CONFIGURATIONS[name])
                 rows[name, truth.file] = told
-                if given.rows is not None:
-                    with given.rows.open("a") as stream:
+                if written is not None:
+                    with written.open("a") as stream:
                         stream.write(json.dumps(told) + "\n")
                 said = told["measures"]
                 print(
