@@ -338,8 +338,7 @@ def test_a_polygon_is_a_region_of_interest(photo, search) -> None:
         ["--roi", "a,b,c,d"],
         ["--roi", "0,0,nan,5"],
         ["--roi", "1000,1000,5,5"],
-        ["--structure", "circular"],
-        ["--structure", "hybrid"],
+        ["--structure", "spiral"],
         ["--features", "sift"],
         ["--features", "alexnet"],
         ["--focal", "0"],
@@ -363,9 +362,10 @@ def test_wrong_usage_is_2_with_one_line(words: list[str], photo, capsys) -> None
     assert captured.err.startswith("error: ") and captured.err.count("\n") == 1
 
 
-def test_structures_to_come_are_refused_by_name(photo, capsys) -> None:
-    run(["synth", photo("a.png"), "--structure", "circular"])
-    assert "not there yet" in capsys.readouterr().err
+@pytest.mark.parametrize("structure", ["auto", "lattice", "circular", "hybrid"])
+def test_every_structure_can_be_asked_for(structure: str, photo, search) -> None:
+    assert run(["synth", photo("a.png"), "--structure", structure]) == 0
+    assert search.configs[0].structure == structure
 
 
 def test_verbose_names_the_focal_and_where_it_came_from(photo, capsys) -> None:

@@ -28,8 +28,7 @@ def test_features_may_be_joined() -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"structure": "spiral"}, "structure is one of auto, lattice, not 'spiral'"),
-        ({"structure": "circular"}, "not there yet"),
+        ({"structure": "spiral"}, "structure is one of auto, lattice, circular, hybrid, not 'spiral'"),
         ({"extent": "all"}, "extent is one of"),
         ({"features": "oriented+sift"}, "not 'sift'"),
         ({"features": "alexnet"}, "--weights FILE"),

@@ -1,14 +1,18 @@
 """Instances: known places are found to a few hundredths of a cell, and the fit goes where they lie."""
 
+import math
+
 import cv2
 import numpy as np
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from truth import PATTERN, blank_level, lattice_error, pose_error_deg, turned
 
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.lattice import PHASE, Lattice, map_from_index
-from p3i.search.register import Instances, find_instances, fit_instances
+from p3i.search.register import Instances, find_instances, fit_instances, robust_fit
 from p3i.vision.image import Image
 
 STEP_PX = 40.0
@@ -126,3 +130,54 @@ def test_what_is_fixed_stays() -> None:
     assert found.rx_deg == start.rx_deg
     assert np.array_equal(found.origin, start.origin)
     assert not np.array_equal(found.basis, start.basis)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    shift=st.tuples(*[st.floats(-2, 2)] * 3),
+    strays=st.integers(0, 8),
+)
+@settings(max_examples=40, deadline=None)
+def test_numbers_come_back_whatever_a_quarter_of_strays_says(
+    seed: int, shift: tuple[float, float, float], strays: int
+) -> None:
+    """A circle's centre and radius, from 32 points on it, some of them anywhere."""
+    random = np.random.default_rng(seed)
+    turn = torch.arange(32, dtype=torch.float64) * 2 * math.pi / 32
+    around = torch.stack([turn.cos(), turn.sin()], 1)
+
+    def points_of(numbers: torch.Tensor) -> torch.Tensor:
+        return numbers[..., None, :2] + numbers[..., None, 2:] * around
+
+    truth = torch.tensor([3.0, -5.0, 20.0], dtype=torch.float64)
+    targets = points_of(truth) + torch.from_numpy(random.normal(0, 0.02, (32, 2)))
+    lost = random.choice(32, strays, replace=False)
+    targets[lost] += torch.from_numpy(random.uniform(-30, 30, (strays, 2)))
+    found = robust_fit(
+        points_of,
+        truth + torch.tensor(shift, dtype=torch.float64),
+        targets=targets,
+        whiten=(torch.eye(2, dtype=torch.float64) / 0.5).expand(32, 2, 2),
+        weights=torch.ones(32, dtype=torch.float64),
+        limits=torch.ones(3, dtype=torch.float64),
+        iterations=40,
+    )
+    assert float((found - truth).abs().max()) < 0.3
+
+
+def test_a_prior_holds_what_the_points_do_not_tell() -> None:
+    def points_of(numbers: torch.Tensor) -> torch.Tensor:
+        return numbers[..., None, :1].expand(*numbers.shape[:-1], 5, 2)  # the second number moves nothing
+
+    two = torch.ones(2, dtype=torch.float64)
+    found = robust_fit(
+        points_of,
+        torch.zeros(2, dtype=torch.float64),
+        targets=torch.full((5, 2), 4.0, dtype=torch.float64),
+        whiten=torch.eye(2, dtype=torch.float64).expand(5, 2, 2),
+        weights=torch.ones(5, dtype=torch.float64),
+        limits=two,
+        prior=torch.tensor([[0.0, 0.0], [7.0, 1.0]], dtype=torch.float64),
+        iterations=40,
+    )
+    np.testing.assert_allclose(found, [4.0, 7.0], atol=0.02)
