@@ -19,6 +19,7 @@ from p3i.vision.image import Image
 
 torch.set_num_threads(1)
 
+SMALL = Size(448, 336)
 _FINER = 4  # drawn larger, then averaged
 # A flag: (along, across) the circle, in halves of the object's size; no turn takes it to itself.
 _FLAG = np.array([(-1, -1), (1, -1), (1, 0), (-0.3, 0), (-0.3, 1), (-1, 1)], float)
@@ -43,7 +44,7 @@ class DrawnRing:
     focal_mm: float = 35.0
     missing: frozenset[int] = frozenset()
     nudges: Mapping[int, tuple[float, float]] | None = None
-    canvas: Size = Size(448, 336)
+    canvas: Size = SMALL
     noise: float = 0.01
 
     @property
@@ -107,7 +108,7 @@ def tilt_error_deg(found: Program, rx_deg: float, ry_deg: float) -> float:
     return math.degrees(math.acos(min(1.0, abs(float(first @ second)))))
 
 
-def noise_image(size: Size = Size(448, 336), *, seed: int = 0) -> Image:
+def noise_image(size: Size = SMALL, *, seed: int = 0) -> Image:
     """Blotches of all sizes, and no pattern."""
     random = np.random.default_rng(seed)
     pixels = np.full((size.height, size.width, 3), 0.5, np.float32)

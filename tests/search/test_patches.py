@@ -1,4 +1,4 @@
-"""Object patches: equal where objects turn with their ring, a contrast only at the right count, objects found."""
+"""Object patches: equal where objects turn with their ring, contrast at the right count, objects found."""
 
 import math
 
