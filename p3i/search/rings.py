@@ -57,7 +57,7 @@ def found_rings(session: Session) -> tuple[FoundRing, ...]:
                 continue
             fits.append(fit)
             session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
-        fits.sort(key=lambda fit: -fit.quality)
+        fits.sort(key=lambda fit: -curve_score(fit))  # a third of a ring agrees as well as all of it
         rings = [_finished(session, fit) for fit in fits[:_MOST_FINISHED]]
         session.rings = tuple(sorted(rings, key=lambda ring: -ring.score))
     return session.rings
