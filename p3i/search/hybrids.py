@@ -4,6 +4,8 @@ Each starts from a ring that was found by itself: with its pose, the other rings
 plane (propose/hybrid.py). Then all numbers are fitted together, as with a single ring.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from p3i.grammar.sketch import Sketch, parse_sketch
@@ -19,32 +21,100 @@ _FEWEST = 4
 # More rings are believed where their objects agree at least so well, compared with the ring's own.
 _KEPT_QUALITY = 0.6
 # Every ring of a hybrid has at least this share of the contrast of the plainest.
-_LEAST_RING = 0.4
+_LEAST_RING = 0.25
+# A ring that goes round this far is taken for a whole one.
+_CLOSED_DEG = 300.0
+_MOST_GROWTHS = 4
+# Whether a further ring is there is looked at in patches of this share of the fit's: the outermost ring may
+# lie close to a rim.
+_CLOSE_LOOK = 0.6
 _MOST_TOLD = 2
 
 
 def find_hybrids(session: Session) -> list[Answer]:
     """The hybrids of a photo as finished programs, the most worth first; none where no ring convinces."""
     found: list[tuple[float, float, CurveFit]] = []
+    done: list[BaseRing] = []
     for ring in found_rings(session):
-        if ring.fit.quality < _LEAST_QUALITY or len(ring.fit.contrast) < _FEWEST or not session.go_on():
+        if min(ring.fit.quality, 1.5 * ring.score) < _LEAST_QUALITY or len(ring.fit.contrast) < _FEWEST:
             continue
+        if not session.go_on():
+            break
         session.tell("more rings", 0.95)
         base = _base_of(ring.fit)
-        proposals = rings_around(session.evidence, base)
-        if len(base.fit.filling.pattern.index) * abs(base.step_deg) > 300:
-            proposals += ring_repeated(session.evidence, base)
-        for proposal in proposals:
-            fit = _fitted(session, ring.fit, proposal)
-            if fit is None:
-                continue
-            session.record("hybrid", program=fit.filling.program(fit.z, ()), score=fit.quality)
-            if _holds(fit, ring.fit):
-                # As with rings, how surely it repeats may be told at another radius than that of the objects.
-                score = max(curve_score(fit), ring.score * min(1.0, fit.quality / ring.fit.quality))
-                found.append((fit.mean * len(fit.contrast), score, fit))
+        if found and any(_same(base, other) for other in done):
+            continue
+        done.append(base)
+        fits = _fits(session, ring.fit, rings_around(session.evidence, base))
+        if base.count * abs(base.step_deg) > _CLOSED_DEG:
+            fits += _fits(session, ring.fit, ring_repeated(session.evidence, base))
+        for fit in fits:
+            # As with rings, how surely it repeats may be told at another radius than that of the objects.
+            score = max(curve_score(fit), ring.score * min(1.0, fit.quality / ring.fit.quality))
+            found.append((fit.mean * len(fit.contrast), score, fit))
     found.sort(key=lambda triple: -triple[0])
     return [answer_of(session, fit, "hybrid", score) for _, score, fit in found[:_MOST_TOLD]]
+
+
+def _fits(session: Session, ring: CurveFit, proposals: list[HybridProposal]) -> list[CurveFit]:
+    """The proposals that hold, fitted, with all the rings that they go on to."""
+    found: list[CurveFit] = []
+    tried: list[HybridProposal] = []
+    for proposal in sorted(proposals, key=lambda proposal: -proposal.objects):
+        if any(_alike(proposal, other) for other in tried):
+            continue
+        tried.append(proposal)
+        fit = _fitted(session, ring, proposal)
+        if fit is None or not _holds(fit, ring):
+            continue
+        fit = _grown(session, fit, proposal)
+        session.record("hybrid", program=fit.filling.program(fit.z, ()), score=fit.quality)
+        found.append(fit)
+    return found
+
+
+def _same(first: BaseRing, second: BaseRing) -> bool:
+    """Whether two rings lie about one centre and turn by the same step."""
+    apart = float(np.hypot(*(first.center - second.center)))
+    return apart < 0.1 * first.radius and abs(first.step_deg - second.step_deg) < 0.05 * abs(first.step_deg)
+
+
+def _alike(first: HybridProposal, second: HybridProposal) -> bool:
+    """Whether two proposals are the same but for small differences that a fit takes away."""
+    names = ("first", "last", "count", "counted_by_ring")
+    if any(getattr(first, name) != getattr(second, name) for name in names):
+        return False
+    return abs(first.growth - second.growth) + abs(first.radius - second.radius) < 0.1 * second.growth
+
+
+def _grown(session: Session, fit: CurveFit, proposal: HybridProposal) -> CurveFit:
+    """The hybrid with further rings at either end, as long as these hold as well."""
+    side = _CLOSE_LOOK * fit.side
+    for _ in range(_MOST_GROWTHS):
+        values = values_of(fit)
+        for change in ({"last": proposal.last + 1}, {"first": proposal.first - 1}):
+            wider = replace(proposal, **change)
+            if wider.counted_by_ring and (
+                wider.first < 1 or wider.count * wider.last * abs(values["draw.x.angle.j"]) > 360.5
+            ):
+                continue
+            if values["draw.x.radius.1"] + wider.first * values.get("draw.x.radius.i", 0.0) <= 0:
+                continue
+            filling = hybrid_filling(wider)
+            numbers = numbers_of(filling, values)
+            more = measured(session.evidence, filling, numbers, focal_mm=fit.focal_mm, side=side)
+            now = measured(session.evidence, fit.filling, fit.z, focal_mm=fit.focal_mm, side=side)
+            if more is None or now is None or len(more.contrast) < len(fit.contrast) + 3:
+                continue
+            if _evenly_sure(more) and more.mean > _KEPT_QUALITY * now.mean:
+                moved = follow(session.evidence, more, rounds=2, free_focal=session.focal_is_free)
+                whole = measured(session.evidence, filling, moved.z, focal_mm=moved.focal_mm)
+                if whole is not None:
+                    fit, proposal = replace(whole, cost=moved.cost), wider
+                    break
+        else:
+            return fit
+    return fit
 
 
 def hybrid_filling(proposal: HybridProposal) -> Filling:
@@ -73,6 +143,7 @@ def _base_of(fit: CurveFit) -> BaseRing:
         values["draw.x.radius.1"],
         values["draw.x.angle.1"],
         values.get("draw.x.angle.j", 360 / len(fit.filling.pattern.index)),
+        len(fit.filling.pattern.index),
     )
 
 
@@ -95,13 +166,18 @@ def _fitted(session: Session, ring: CurveFit, proposal: HybridProposal) -> Curve
     start = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=ring.focal_mm)
     if start is None or start.mean < 0.5 * _KEPT_QUALITY * ring.mean:
         return None
-    return follow(session.evidence, start, rounds=4, free_focal=session.focal_is_free)
+    return follow(session.evidence, start, rounds=3, free_focal=session.focal_is_free)
 
 
 def _holds(fit: CurveFit, ring: CurveFit) -> bool:
     """Whether a fit says more than the ring alone: more objects, nearly as sure, on each of its rings."""
     if len(fit.contrast) <= len(ring.contrast) + 1 or fit.quality < _KEPT_QUALITY * ring.quality:
         return False
+    return _evenly_sure(fit)
+
+
+def _evenly_sure(fit: CurveFit) -> bool:
+    """Whether there are several rings, and each has objects."""
     rings = fit.index[:, 0]
     means = [float(fit.contrast[rings == i].mean()) for i in rings.unique()]
     return len(means) > 1 and min(means) >= _LEAST_RING * max(means)

@@ -24,21 +24,23 @@ from p3i.vision.warp import in_frame
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
-# Patches are a bit smaller than the ring's own, so that rings close by do not get in, with so many samples.
-_PATCH = 0.7
-_SAMPLES = 10
+# Patches are smaller than the ring's own, so that rings close by do not get in: these shares are tried, with
+# so many samples a side.
+_PATCHES = (0.7, 0.4)
+_SAMPLES = 8
 # Radii are tried in steps of this share of a patch, up to so many program units, on at most so many angles.
-_RADIUS_STEP = 0.125
+_RADIUS_STEP = 0.15
 _MOST_RADIUS = 75.0
 _MOST_SLOTS = 48
 # An object is there where its agreement reaches this share of the ring's own objects'.
 _PRESENT = 0.55
+_LACKING = 0.7
 _MOST_RINGS = 6
 _MOST_FAN_COUNT = 16
 # An object where none should be counts this much of one.
 _STRAY = 0.5
 # Each ring holds at least this share of its objects, weighed by how plain they are.
-_RING_SHARE = 0.45
+_RING_SHARE = 0.35
 # The straightened plane has this many pixels a side; at most so many times further away than the nearest.
 _CANVAS = 256
 _DEPTH_RANGE = 4.0
@@ -72,18 +74,17 @@ class HybridProposal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseRing:
-    """The ring to start from: its fit, and its numbers in program units and degrees."""
+    """The ring to start from, by itself or among others: its numbers in program units and degrees.
+
+    `fit` says what its objects look like, and the pose; `count` is how many objects it has itself.
+    """
 
     fit: CurveFit
     center: Array
     radius: float
     phase_deg: float
     step_deg: float
-
-    @property
-    def count(self) -> int:
-        """How many objects its program draws."""
-        return len(self.fit.filling.pattern.index)
+    count: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,11 +99,13 @@ class Around:
 
 
 def rings_around(evidence: Evidence, base: BaseRing) -> list[HybridProposal]:
-    """The best reading as rings of equal counts, and the best as rings whose counts grow, each if any."""
-    around = _around(evidence, base)
-    if around is None:
-        return []
-    return [found for found in (_concentric(base, around), _fan(base, around)) if found is not None]
+    """Readings as rings of equal counts and as rings whose counts grow, the best of each size of patches."""
+    found: list[HybridProposal] = []
+    for share in _PATCHES:
+        around = _around(evidence, base, share * base.fit.side)
+        if around is not None:
+            found += [got for got in (_concentric(base, around), _fan(base, around)) if got is not None]
+    return found
 
 
 def ring_repeated(evidence: Evidence, base: BaseRing) -> list[HybridProposal]:
@@ -111,12 +114,12 @@ def ring_repeated(evidence: Evidence, base: BaseRing) -> list[HybridProposal]:
     return [] if found is None else _along_lines(base, *found)
 
 
-def _around(evidence: Evidence, base: BaseRing) -> Around | None:
+def _around(evidence: Evidence, base: BaseRing, side: float) -> Around | None:
+    """What patches of `side` program units about the centre look like."""
     slots = round(360 / abs(base.step_deg))
     if slots > _MOST_SLOTS:
         return None
     fit, pattern = base.fit, base.fit.filling.pattern
-    side = _PATCH * fit.side
     own = frames(pattern, fit.theta, fit.index, side=side)
     radii = np.arange(0.5 * side, _MOST_RADIUS, _RADIUS_STEP * side)
     angles = np.radians(base.phase_deg + np.arange(2 * slots) * base.step_deg / 2)
@@ -149,9 +152,10 @@ def _around(evidence: Evidence, base: BaseRing) -> Around | None:
     objects, gaps = table[:, 0::2], table[:, 1::2]
     between = np.fmax(np.roll(gaps, 1, 1), gaps)
     # Near the centre half a step is less than an object, and tells nothing.
-    tells = radii * math.radians(abs(base.step_deg)) / 2 > 0.4 * fit.side
+    tells = radii * math.radians(abs(base.step_deg)) / 2 > 0.6 * side
     contrast = objects - np.where(tells[:, None], np.nan_to_num(between), 0.0) * 0.5
-    worth = np.clip(contrast / plain - _PRESENT, -_PRESENT, 1 - _PRESENT) / (1 - _PRESENT)
+    # One that lacks is forgiven: it may be covered.
+    worth = np.clip((contrast / plain - _PRESENT) / (1 - _PRESENT), -_LACKING, 1)
     return Around(np.nan_to_num(worth), radii)
 
 
