@@ -1,11 +1,13 @@
 """Rings on a photo: proposals, fits, where on the ring the objects sit, which are there, and the program."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 
 from p3i.grammar.sketch import Sketch, parse_sketch
+from p3i.interp.camera import Camera
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, fillings, unknowns_of
 from p3i.search.propose.ring import RingProposal, ring_proposals
@@ -21,6 +23,11 @@ _CERTAIN = 0.3
 # So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
 _MOST_PLACES = 2
 _MUCH_BETTER = 4.0
+# A free focal must lower the logarithm of the misfit, times the objects, by this much, or the quality rise by
+# this factor; misfits are taken to lie between these.
+_FOCAL_PAYS = 6.0
+_MORE_QUALITY = 1.1
+_LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
 # Objects with less than this share of the plain ones' contrast are not there.
 _PRESENT = 0.4
 # A ring is closed where at most this share of it lacks in one piece.
@@ -49,7 +56,7 @@ def found_rings(session: Session) -> tuple[FoundRing, ...]:
     if session.rings is None:
         session.tell("turning", 0.82)
         fits: list[CurveFit] = []
-        for proposal in ring_proposals(session.evidence)[:_MOST_FITTED]:
+        for proposal in ring_proposals(session.evidence, seed=session.config.seed)[:_MOST_FITTED]:
             if not session.go_on():
                 break
             fit = ring_fit(session, proposal)
@@ -103,13 +110,42 @@ def ring_fit(session: Session, proposal: RingProposal) -> CurveFit | None:
     first = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=proposal.focal_mm)
     if first is None:
         return None
-    fit = follow(session.evidence, first, rounds=4)
-    return follow(session.evidence, fit, rounds=3, free_focal=True) if session.focal_is_free else fit
+    return _followed(session, first, rounds=4)
+
+
+def _followed(session: Session, fit: CurveFit, *, rounds: int) -> CurveFit:
+    """Some rounds of registration, with the focal free where nobody stated it."""
+    if not session.focal_is_free:
+        return follow(session.evidence, fit, rounds=rounds)
+    if fit.focal_mm == session.evidence.focal_mm:
+        fit = follow(session.evidence, fit, rounds=rounds)
+    return follow(session.evidence, fit, rounds=3, free_focal=True)
+
+
+def _with_paid_focal(session: Session, fit: CurveFit) -> CurveFit:
+    """The fit with the focal that was assumed, where another one does not pay for itself.
+
+    One more number always fits a little better; whether it tells something shows an F-test on the misfit.
+    """
+    assumed = session.evidence.focal_mm
+    if fit.focal_mm == assumed:
+        return fit
+    values = values_of(fit)
+    camera = Camera(values["camera.rx"], values["camera.ry"], fit.focal_mm).refocused(assumed)
+    values |= {"camera.rx": camera.rx_deg, "camera.ry": camera.ry_deg}
+    start = measured(session.evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=assumed)
+    if start is None:
+        return fit
+    kept = follow(session.evidence, start, rounds=5)
+    misfits = [min(one.cost, _WORST_MISFIT) + _LEAST_MISFIT for one in (kept, fit)]
+    gain = len(fit.contrast) * math.log(misfits[0] / misfits[1])
+    paid = gain > _FOCAL_PAYS or fit.quality > _MORE_QUALITY * kept.quality
+    return fit if paid else kept
 
 
 def _finished(session: Session, fit: CurveFit) -> FoundRing:
     """The ring as far as it goes, its draws put where the objects sit."""
-    fit = _extended(session, fit)
+    fit = _with_paid_focal(session, _extended(session, fit))
     # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
     found, score = fit, curve_score(fit)
     for rank, place in enumerate(places(session.evidence, _ring_of(session, fit))[:_MOST_PLACES]):
@@ -130,7 +166,8 @@ def _moved(session: Session, fit: CurveFit, place: Place) -> CurveFit | None:
     moved = measured(session.evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=fit.focal_mm)
     if moved is None:
         return None
-    return follow(session.evidence, moved, rounds=3, free_focal=session.focal_is_free)
+    free = fit.focal_mm != session.evidence.focal_mm
+    return follow(session.evidence, moved, rounds=3, free_focal=free)
 
 
 def _extended(session: Session, fit: CurveFit) -> CurveFit:
@@ -180,7 +217,7 @@ def _arc(session: Session, fit: CurveFit, values: dict[str, float], drawn: int) 
     arc = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
     if arc is None:
         return None
-    return follow(session.evidence, arc, rounds=2, free_focal=session.focal_is_free)
+    return _followed(session, arc, rounds=2)
 
 
 def _closed(session: Session, fit: CurveFit, values: dict[str, float], slots: int) -> CurveFit | None:
@@ -189,7 +226,7 @@ def _closed(session: Session, fit: CurveFit, values: dict[str, float], slots: in
     ring = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
     if ring is None:
         return None
-    return follow(session.evidence, ring, rounds=3, free_focal=session.focal_is_free)
+    return _followed(session, ring, rounds=3)
 
 
 def _best_run(fit: CurveFit, *, closed: bool = True) -> tuple[int, int]:

@@ -71,7 +71,8 @@ def synthesize(
         session.record("answer", program=None, score=best, reason=refused.reason)
         return refused
     first = good[0]
-    margin = first.worth - max((answer.worth for answer in answers if answer is not first), default=0.0)
+    runner_up = max((answer.worth for answer in answers if answer is not first), default=0.0)
+    margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
     session.tell("done", 1.0)
     session.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return result(
@@ -79,7 +80,7 @@ def synthesize(
         session.stopped or StopReason.FOUND,
         structure=first.structure,
         score=first.score,
-        margin=margin / max(first.worth, 1e-9),
+        margin=margin,
         needed=needed,
         candidates=tuple(
             Candidate(
@@ -106,7 +107,11 @@ def _found(session: Session) -> list[Answer]:
         if asked is not None:
             answers.append(asked(session))
         for family in FAMILIES if asked is None else ():
-            beyond_doubt = any(answer.score > _BEYOND_DOUBT for found in answers for answer in found)
+            beyond_doubt = any(
+                answer.score > _BEYOND_DOUBT and answer.structure != family.starts_from
+                for found in answers
+                for answer in found
+            )
             if session.config.structure == family.structure or (
                 session.config.structure == "auto" and not beyond_doubt
             ):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.evidence import Evidence
+from p3i.search.propose.ellipses import circle_seeds
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.unrolled import Rows, best_rows, likeness, unroll
 
@@ -43,7 +44,9 @@ _SAME_CENTRE = 0.03
 _MOST_CENTRES = 16
 _POSES_A_CENTRE = 3
 # From so many centres the search climbs to the best pose and centre near by.
-_MOST_CLIMBED = 4
+_MOST_CLIMBED = 5
+# A circle of spots is worth as much as a centre with so many votes.
+_SPOTS_WORTH = 0.15
 # The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
 _STEP_DEG = 6.0
 _STEP_SHARE = 0.08
@@ -97,11 +100,17 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
     return sorted(found, key=lambda vote: -vote.worth)
 
 
-def ring_proposals(evidence: Evidence) -> list[RingProposal]:
-    """Rings about the centres with the most votes, the most promising first."""
+def ring_proposals(evidence: Evidence, *, seed: int = 0) -> list[RingProposal]:
+    """Rings about the centres with the most votes and on circles of spots, the most promising first.
+
+    `seed` is that of the draws of spots.
+    """
     centres: list[tuple[Vote, list[Rows]]] = []
     for votes in _by_centre(rotation_votes(evidence), evidence.image.size.longer):
         centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
+    for circle in circle_seeds(evidence, np.random.default_rng(seed)):
+        vote = Vote(_SPOTS_WORTH, circle.rx_deg, circle.ry_deg, circle.center_px)
+        centres.append((vote, _rows_about(evidence, vote)))
     centres.sort(key=_promise, reverse=True)
     found: list[RingProposal] = []
     for vote, rows in centres[:_MOST_CLIMBED]:
