@@ -8,6 +8,7 @@ register.py), and `Answer`, whose scores are comparable between families.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from p3i.search.hybrids import find_hybrids
 from p3i.search.lattices import find_lattices
 from p3i.search.result import StructureFound
 from p3i.search.rings import find_rings
@@ -16,10 +17,18 @@ from p3i.search.session import Answer, Session
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """A kind of pattern: its name, and how its programs are found on a photo, the most worth first."""
+    """A kind of pattern: its name, and how its programs are found on a photo, the most worth first.
+
+    A family that `starts_from` another one's programs may say more than these, however sure they are.
+    """
 
     structure: StructureFound
     find: Callable[[Session], list[Answer]]
+    starts_from: StructureFound | None = None
 
 
-FAMILIES: tuple[Family, ...] = (Family("lattice", find_lattices), Family("circular", find_rings))
+FAMILIES: tuple[Family, ...] = (
+    Family("lattice", find_lattices),
+    Family("circular", find_rings),
+    Family("hybrid", find_hybrids, starts_from="circular"),
+)

@@ -295,7 +295,7 @@ def _alike_when_shifted(evidence: Evidence, base: BaseRing) -> tuple[Floats, flo
     valid = warped(colours.valid.numpy())
     known = cv2.erode(((depth > 0) & (valid > 0.99)).astype(np.uint8), np.ones((5, 5))).astype(np.float32)
     lab = cv2.GaussianBlur(warped(colours.values.permute(1, 2, 0).numpy()), (0, 0), 0.8)
-    tensor = double_angle(lab) * known
+    tensor = double_angle(np.asarray(lab, np.float32)) * known
     energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.04 * _CANVAS)
     tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
     centers = (pattern.points_at(fit.index, fit.theta).numpy() - corner) / unit

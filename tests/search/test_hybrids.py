@@ -1,0 +1,120 @@
+"""Hybrids, from the photo to the program: one scene of each kind, and no hybrid where there is one ring."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from drawn import DrawnRing
+
+from p3i.evaluation.hybrid_scenes import hybrid_scene
+from p3i.evaluation.scene import Scene, on_canvas
+from p3i.grammar.ast import Affine, Polar
+from p3i.grammar.leaves import leaves
+from p3i.interp.camera import Camera
+from p3i.interp.unroll import nest
+from p3i.search.config import SearchConfig
+from p3i.search.curves import curve_score, follow, measured
+from p3i.search.evidence import Evidence
+from p3i.search.hybrids import find_hybrids, hybrid_filling
+from p3i.search.propose.hybrid import HybridProposal
+from p3i.search.result import NEEDED
+from p3i.search.rings import FoundRing, numbers_of, ring_filling
+from p3i.search.session import Answer, Session
+
+SCENES = {"concentric": 12, "fan": 9, "row": 14}
+MOVING = ("draw.x.radius.1", "draw.x.offset.1", "draw.y.offset.1")
+PROPOSAL = HybridProposal(
+    first=1,
+    last=3,
+    radius=2.0,
+    growth=8.0,
+    center=(0.0, 0.0),
+    along=(0.0, 0.0),
+    step_deg=20.0,
+    phase_deg=5.0,
+    count=4,
+    counted_by_ring=True,
+    objects=24.0,
+)
+
+
+def session_with_ring(
+    evidence: Evidence, values: dict[str, float], *, count: int, drawn: int | None = None
+) -> Session:
+    """A search that has found this ring, from a start a little off."""
+    session = Session(evidence, SearchConfig(focal_mm=35.0))
+    filling = ring_filling(count, drawn=drawn)
+    off = values | {"camera.rx": values["camera.rx"] + 0.7, "camera.ry": values["camera.ry"] - 0.5}
+    start = measured(evidence, filling, numbers_of(filling, off), focal_mm=35.0)
+    assert start is not None
+    fit = follow(evidence, start, rounds=4)
+    session.rings = (FoundRing(fit, curve_score(fit)),)
+    return session
+
+
+@lru_cache
+def shown(kind: str) -> tuple[Scene, Answer]:
+    """The scene of a kind, and the answer from the second of its rings."""
+    scene = hybrid_scene(SCENES[kind], kind=kind)
+    evidence = Evidence(scene.image(), SearchConfig(focal_mm=35.0), 35.0)
+    values = leaves(scene.program)
+    ring = sorted(set(scene.index[:, 0].tolist()))[1]
+    own = {name: values[name] + ring * values[f"{name[:-1]}i"] for name in MOVING} | {
+        name: values[name] for name in ("camera.rx", "camera.ry", "draw.x.angle.1")
+    }
+    count = int((scene.index[:, 0] == ring).sum())
+    answers = find_hybrids(session_with_ring(evidence, own, count=count))
+    assert answers, f"no hybrid in the scene of kind {kind}"
+    return scene, answers[0]
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_every_object_of_a_hybrid_is_drawn_and_none_besides(kind: str) -> None:
+    scene, answer = shown(kind)
+    drawn, _, seen = on_canvas(answer.program, scene.size)
+    apart = np.linalg.norm(scene.centers_px[:, None] - drawn[seen], axis=2)
+    between = np.linalg.norm(scene.centers_px[:, None] - scene.centers_px, axis=2)
+    reach = 0.25 * np.median(np.sort(between, axis=1)[:, 1])
+    assert answer.structure == "hybrid"
+    assert seen.sum() == len(scene.centers_px)
+    assert (apart.min(1) < reach).all()
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_the_pose_of_a_hybrid_is_right_to_a_degree(kind: str) -> None:
+    scene, answer = shown(kind)
+    between = np.dot(Camera.of(answer.program).normal, scene.camera.normal)
+    assert math.degrees(math.acos(min(1.0, between))) < 1
+
+
+def test_a_fan_is_written_with_a_count_that_grows_with_i() -> None:
+    _, answer = shown("fan")
+    for_j = nest(answer.program).for_j
+    assert for_j is not None and for_j.stop == Affine(i=6)
+
+
+def test_a_row_of_rings_moves_its_centre_with_i_and_not_its_radius() -> None:
+    _, answer = shown("row")
+    x = nest(answer.program).draw.x
+    assert isinstance(x, Polar) and x.radius.i == 0 and x.offset.i != 0
+
+
+def test_a_single_ring_is_no_hybrid() -> None:
+    ring = DrawnRing()
+    values = {
+        "camera.rx": ring.rx_deg,
+        "camera.ry": ring.ry_deg,
+        "draw.x.radius.1": ring.radius,
+        "draw.x.angle.1": ring.first_deg,
+        "draw.x.offset.1": ring.center[0],
+        "draw.y.offset.1": ring.center[1],
+    }
+    session = session_with_ring(ring.evidence(), values, count=ring.count)
+    assert session.rings is not None and session.rings[0].score > NEEDED
+    assert find_hybrids(session) == []
+
+
+def test_the_sketch_of_a_fan_draws_four_eight_and_twelve_objects() -> None:
+    index = hybrid_filling(PROPOSAL).pattern.index[:, 0]
+    assert [int((index == i).sum()) for i in (1, 2, 3)] == [4, 8, 12]
