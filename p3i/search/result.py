@@ -91,6 +91,10 @@ class SynthesisResult:
     @property
     def reason(self) -> str:
         """Why the search ended, as a sentence with its numbers; empty where there is nothing to explain."""
-        if self.stop in (StopReason.NO_PATTERN, StopReason.NO_FIT) and self.score is not None and self.needed is not None:
+        if (
+            self.stop in (StopReason.NO_PATTERN, StopReason.NO_FIT)
+            and self.score is not None
+            and self.needed is not None
+        ):
             return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
         return self.stop.value
