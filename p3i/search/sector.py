@@ -137,7 +137,8 @@ def _middle(
     The cues take the cell for a torus, which it is along the arc; so only rows near the middle are asked.
     """
     colours = np.stack([sectors.cut(plane, rows) for plane in np.moveaxis(sectors.lab, -1, 0) / 100], 1)
-    sure = np.flatnonzero(ring.weights >= 0.5 * ring.weights.max())
+    weights = ring.weights.clip(0)  # where none is sure, all are asked
+    sure = np.flatnonzero(weights >= 0.5 * weights.max())
     median, _ = median_cell(np.asarray(colours, np.float32), sectors.cut(sectors.known, rows), sure)
     cues = {
         "symmetry": symmetry(template),
