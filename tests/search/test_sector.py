@@ -48,3 +48,8 @@ def test_objects_that_are_not_there_do_not_mislead_where_they_weigh_nothing() ->
     weights = np.array([1.0] * 6 + [0.0] * 6)
     place = told(radius=22.0, turn_deg=8.0, ring=half, weights=weights)
     assert abs(place.radius - half.radius) < 0.3 * half.size
+
+
+def test_objects_of_which_none_is_sure_still_have_a_place() -> None:
+    place = told(radius=26.0, turn_deg=5.0, weights=np.linspace(-0.3, -0.1, DRAWN.count))
+    assert place.worth > 0
