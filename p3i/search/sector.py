@@ -32,9 +32,9 @@ _LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
 # How much the profile speaks beside the cues of phase.py.
-_PROFILE = 4.0
+_PROFILE = 6.0
 # The object's middle lies this close to the radius where most repeats, in sector sides.
-_NEAR = 0.1
+_NEAR = 0.17
 
 
 @dataclass(frozen=True, slots=True, eq=False)
