@@ -11,6 +11,7 @@ import numpy as np
 
 from p3i.evaluation.looks import Random, random_colour
 from p3i.paint.view import View
+from p3i.vision.decode import decode, swap_red_blue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,10 +106,9 @@ def photographed(
     if not squeezed:
         return pixels, None
     quality = int(random.integers(60, 93))
-    _, packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-    read = cv2.imdecode(packed, cv2.IMREAD_COLOR)
-    assert read is not None
-    return np.ascontiguousarray(read[..., ::-1]), packed.tobytes()
+    _, packed = cv2.imencode(".jpg", swap_red_blue(pixels), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    read = decode(packed.tobytes(), name="the scene", max_px=pixels.size).pixels
+    return np.rint(read * 255).astype(np.uint8), packed.tobytes()
 
 
 def beneath(canvas: np.ndarray, places_px: np.ndarray) -> np.ndarray:

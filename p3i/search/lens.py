@@ -144,12 +144,14 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
     free = free_numbers(pattern, theta)
     places = torch.tensor(free.places)
 
+    selector = torch.eye(len(theta), dtype=torch.float64)[places]
+
     def points_of(moving: torch.Tensor) -> torch.Tensor:
-        numbers = theta.index_put((places,), moving[:-1])
+        numbers = theta + (moving[..., :-1] - theta[places]) @ selector
         at = pattern.image_from_plane(numbers, size=canvas, focal_mm=focal_mm)
         straight, _ = project(at, pattern.points_at(index, numbers))
         return photo_from_straight(
-            _shifted(straight, canvas, seen.photo_size), moving[-1], size=seen.photo_size
+            _shifted(straight, canvas, seen.photo_size), moving[..., -1, None, None], size=seen.photo_size
         )[0]
 
     start = torch.cat([theta[places], torch.tensor([seen.k1], dtype=torch.float64)])

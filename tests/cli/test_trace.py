@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image as Pil
+from truth import small_scene
 
 import p3i
 from p3i.cli.main import run
@@ -15,7 +16,6 @@ from p3i.paint.steps import read_steps
 from p3i.search.config import SearchConfig
 from p3i.search.synthesize import synthesize
 from p3i.vision.write import write_image
-from truth import small_scene
 
 PHOTO = {"step": "photo", "image": "a.png", "width": 80, "height": 60, "focal": 35.0, "version": 1}
 LATTICE = "for i in range(0, 3):\n    for j in range(0, 3):\n        Draw(x=20*i - 20, y=20*j - 20)\n"
