@@ -121,11 +121,12 @@ def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
     mapped = np.stack([x, y, np.ones_like(x)], -1) @ matrix.T
     front = mapped[..., 2] > 1e-6
     at = (mapped[..., :2] / np.where(front, mapped[..., 2], 1.0)[..., None]).astype(np.float32)
+    maps = at[..., 0], at[..., 1]
     height, width = colours.valid.shape
     known = front & (at >= 0).all(-1) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
-    known &= cv2.remap(colours.valid.numpy().astype(np.float32), at, None, cv2.INTER_LINEAR) > 0.99
+    known &= cv2.remap(colours.valid.numpy().astype(np.float32), *maps, cv2.INTER_LINEAR) > 0.99
     lab = np.ascontiguousarray(colours.values.permute(1, 2, 0).numpy())
-    values = cv2.remap(lab, at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    values = cv2.remap(lab, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return Sectors(np.asarray(values, np.float32), known, radii)
 
 

@@ -215,7 +215,7 @@ def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, F
     seen[:, :2] = seen[:, -2:] = 0
     if not seen.any():
         return None
-    tensor = double_angle(cv2.GaussianBlur(warped(lab), (0, 0), 0.8)) * seen
+    tensor = double_angle(np.asarray(cv2.GaussianBlur(warped(lab), (0, 0), 0.8), np.float32)) * seen
     energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.08 * _CANVAS)
     tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
     nearest = depth[seen > 0].min()
@@ -250,7 +250,7 @@ def _votes(tensor: NDArray, weights: Floats) -> Floats:
             return cv2.warpAffine(np.ascontiguousarray(plane, np.float32), matrix, (_CANVAS, _CANVAS))
 
         weight = turned(weights)
-        other = (turned(tensor.real) + 1j * turned(tensor.imag)) * np.exp(2j * turn)
+        other = (turned(np.real(tensor)) + 1j * turned(np.imag(tensor))) * np.exp(2j * turn)
         alike = _correlation(first, _transform(other * weight))[..., 0]
         # The imaginary part is sum w E w' + w E' w': the energy of both where they overlap.
         both = _correlation(rest, _transform(weight * np.abs(other) ** 2 + 1j * weight))[..., 1]
@@ -260,7 +260,7 @@ def _votes(tensor: NDArray, weights: Floats) -> Floats:
         shift_y = -(-rotation[1, 0] * columns + (1 - rotation[1, 1]) * rows)
         at = [(shift + _PADDED / 2).astype(np.float32) for shift in (shift_x, shift_y)]
         centred = np.fft.fftshift(ncc).astype(np.float32)
-        turned_by.append(cv2.remap(centred, at[0], at[1], cv2.INTER_LINEAR))
+        turned_by.append(np.asarray(cv2.remap(centred, at[0], at[1], cv2.INTER_LINEAR), np.float32))
     votes = np.sort(np.stack(turned_by), 0)[-_AGREEING:].mean(0)
     votes = votes - cv2.GaussianBlur(votes, (0, 0), 0.06 * _CANVAS)
     return cv2.GaussianBlur(votes, (0, 0), 1.0)  # pyright: ignore[reportReturnType]
@@ -268,7 +268,7 @@ def _votes(tensor: NDArray, weights: Floats) -> Floats:
 
 def _transform(plane: NDArray) -> Floats:
     padded = np.zeros((_PADDED, _PADDED, 2), np.float32)
-    padded[:_CANVAS, :_CANVAS, 0], padded[:_CANVAS, :_CANVAS, 1] = plane.real, plane.imag
+    padded[:_CANVAS, :_CANVAS, 0], padded[:_CANVAS, :_CANVAS, 1] = np.real(plane), np.imag(plane)
     return cv2.dft(padded, flags=cv2.DFT_COMPLEX_OUTPUT, nonzeroRows=_CANVAS)  # pyright: ignore
 
 
