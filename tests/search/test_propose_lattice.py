@@ -8,17 +8,19 @@ from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.lattice import Lattice, map_from_index
 from p3i.search.propose.lattice import (
+    MOST_TILT_DEG,
+    POSE_STEP_DEG,
     Proposal,
-    pose_grid,
     straightened_proposals,
     tilted,
     window_proposals,
 )
+from p3i.search.propose.poses import pose_grid
 from p3i.vision.image import Image
 
 
 def test_the_poses_begin_straight_on_and_cover_all_tilts_up_to_sixty() -> None:
-    poses = pose_grid()
+    poses = pose_grid(POSE_STEP_DEG, MOST_TILT_DEG)
     assert poses[0] == (0.0, 0.0)
     normals = np.array([normal(Lattice(rx, ry, np.eye(2), np.zeros(2))) for rx, ry in poses])
     assert len(np.unique(normals.round(6), axis=0)) == len(poses)

@@ -19,6 +19,7 @@ from p3i.search.curves import CurveFit
 from p3i.search.evidence import Evidence
 from p3i.search.patches import Cells, Frames, frames, read, sample_px
 from p3i.search.propose.ring import double_angle
+from p3i.search.propose.views import depth_of_view, view_canvas
 from p3i.vision.warp import in_frame
 
 Floats = NDArray[np.float32]
@@ -272,20 +273,13 @@ def _alike_when_shifted(evidence: Evidence, base: BaseRing) -> tuple[Floats, flo
     fit, pattern = base.fit, base.fit.filling.pattern
     size = evidence.image.size
     seen = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm).numpy()
-    x, y = np.meshgrid(np.linspace(0, size.width - 1, 17), np.linspace(0, size.height - 1, 17))
-    plane = np.linalg.inv(seen) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
-    if plane[2].max() <= 0:
+    canvas = view_canvas(seen, size, side=_CANVAS, depth_range=_DEPTH_RANGE)
+    if canvas is None:
         return None
-    near = plane[2] >= plane[2].max() / _DEPTH_RANGE
-    points = plane[:2, near] / plane[2, near]
-    low, high = points.min(1), points.max(1)
-    unit = float((high - low).max()) / (_CANVAS - 1)
-    corner = (low + high) / 2 - unit * (_CANVAS - 1) / 2
+    unit = canvas.unit
     colours = evidence.colours_for(unit * size.unit_px)
-    to_view = np.array([[unit, 0, corner[0]], [0, unit, corner[1]], [0, 0, 1.0]])
-    matrix = colours.map_from_photo.numpy() @ seen @ to_view
-    rows, columns = np.mgrid[0:_CANVAS, 0:_CANVAS]
-    depth = matrix[2, 0] * columns + matrix[2, 1] * rows + matrix[2, 2]
+    matrix = colours.map_from_photo.numpy() @ seen @ canvas.plane_from_view
+    depth = depth_of_view(matrix, _CANVAS)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
 
     def warped(planes: NDArray) -> Floats:
@@ -298,6 +292,7 @@ def _alike_when_shifted(evidence: Evidence, base: BaseRing) -> tuple[Floats, flo
     tensor = double_angle(np.asarray(lab, np.float32)) * known
     energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.04 * _CANVAS)
     tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
+    corner = canvas.plane_from_view[:2, 2]
     centers = (pattern.points_at(fit.index, fit.theta).numpy() - corner) / unit
     mask = np.zeros((_CANVAS, _CANVAS), np.float32)
     reach = max(2, round(0.4 * fit.side / unit))

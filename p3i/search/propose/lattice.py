@@ -6,23 +6,24 @@ autocorrelation in overlapping windows, where perspective is mild; right for sma
 for tilts beyond the grid. A window says nothing of the tilt, so it comes with several.
 """
 
-import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from p3i.interp.camera import Camera, image_from_plane
+from p3i.interp.camera import image_from_plane
 from p3i.search.autocorrelation import autocorrelation, best_pair
 from p3i.search.evidence import FINE, Evidence, Level
 from p3i.search.lattice import Lattice, reduce_basis
+from p3i.search.propose.poses import pose_grid
+from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
 from p3i.size import Size
 
 # The canvas of a straightened view, in pixels a side.
 _CANVAS = 128
 # Poses lie about this far apart when seen straight on, closer with tilt, and up to this tilt.
-_POSE_STEP_DEG = 11.0
-_MOST_TILT_DEG = 66.0
+POSE_STEP_DEG = 11.0
+MOST_TILT_DEG = 66.0
 # A view reaches to where things are this many times as far away as the nearest.
 _DEPTH_RANGE = 3.5
 # The autocorrelation sees this many channels (the strongest), which OpenCV warps in one go.
@@ -46,7 +47,7 @@ def straightened_proposals(evidence: Evidence) -> list[Proposal]:
     level = evidence.frame
     view_of = _Views(level, evidence.focal_mm)
     found = []
-    for rx_deg, ry_deg in pose_grid():
+    for rx_deg, ry_deg in pose_grid(POSE_STEP_DEG, MOST_TILT_DEG):
         view = view_of(rx_deg, ry_deg)
         if view is None:
             continue
@@ -91,23 +92,6 @@ def window_proposals(evidence: Evidence) -> list[Proposal]:
     return sorted(found, key=lambda proposal: -proposal.worth)
 
 
-def pose_grid() -> list[tuple[float, float]]:
-    """(rx, ry) in degrees, evenly in foreshortening: the steps shrink as the tilt grows."""
-    poses = [(0.0, 0.0)]
-    tilt, ring = 0.0, 0
-    while True:
-        tilt += _POSE_STEP_DEG * math.sqrt(math.cos(math.radians(tilt)))
-        if tilt > _MOST_TILT_DEG:
-            return poses
-        sine, cosine = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
-        count = max(6, round(2 * math.pi * sine / math.radians(_POSE_STEP_DEG)))
-        for step in range(count):
-            around = 2 * math.pi * (step + 0.5 * (ring % 2)) / count
-            camera = Camera.from_normal((sine * math.cos(around), sine * math.sin(around), cosine))
-            poses.append((camera.rx_deg, camera.ry_deg))
-        ring += 1
-
-
 def _starts(length: int, side: int) -> list[int]:
     """Where windows of `side` start along `length`: half overlapping, the last at the edge."""
     return sorted({*range(0, length - side + 1, side // 2), length - side})
@@ -131,18 +115,10 @@ class _Views:
             level.map_from_photo
             @ image_from_plane(rx_deg, ry_deg, size=level.photo_size, focal_mm=self._focal_mm)
         ).numpy()
-        width, height = level.size.width, level.size.height
-        x, y = np.meshgrid(np.linspace(0, width - 1, 17), np.linspace(0, height - 1, 17))
-        plane = np.linalg.inv(map_from_plane) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
-        near = plane[2] >= plane[2].max() / _DEPTH_RANGE  # the third row is 1 / depth
-        if plane[2].max() <= 0:
+        canvas = view_canvas(map_from_plane, level.size, side=_CANVAS, depth_range=_DEPTH_RANGE)
+        if canvas is None:
             return None
-        points = plane[:2, near] / plane[2, near]
-        low, high = points.min(1), points.max(1)
-        unit = float((high - low).max()) / (_CANVAS - 1)
-        corner = (low + high) / 2 - unit * (_CANVAS - 1) / 2
-        plane_from_view = np.array([[unit, 0, corner[0]], [0, unit, corner[1]], [0, 0, 1.0]])
-        map_from_view = map_from_plane @ plane_from_view
+        map_from_view = map_from_plane @ canvas.plane_from_view
 
         def warped(planes: np.ndarray) -> np.ndarray:
             return cv2.warpPerspective(
@@ -153,18 +129,14 @@ class _Views:
                 borderMode=cv2.BORDER_CONSTANT,
             )
 
-        rows, columns = np.mgrid[0:_CANVAS, 0:_CANVAS]
-        depth = map_from_view[2, 0] * columns + map_from_view[2, 1] * rows + map_from_view[2, 2]
+        depth = depth_of_view(map_from_view, _CANVAS)
         known = np.where(depth > 0, warped(self._known), 0)
         if not (known > 0.5).any():
             return None
-        nearest = depth[known > 0.5].min()
-        # Evenly in the photo, so that a pose that blows up a few pixels does not win.
-        weights = known * (nearest / np.maximum(depth, nearest)) ** 1.5
         features = warped(self._planes)
         if features.ndim == 2:
             features = features[:, :, None]
-        return features, weights.astype(np.float32), unit, (low + high) / 2
+        return features, even_weights(known, depth), canvas.unit, canvas.middle
 
 
 def tilted(proposal: Proposal, *, rx_deg: float, ry_deg: float, focal_mm: float, size: Size) -> Proposal:

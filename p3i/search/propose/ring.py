@@ -19,6 +19,8 @@ from p3i.search.evidence import Evidence
 from p3i.search.propose.ellipses import circle_seeds
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.unrolled import Rows, best_rows, likeness, unroll
+from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
+from p3i.size import Size
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -193,18 +195,11 @@ def _by_centre(votes: list[Vote], longer: int) -> list[list[Vote]]:
 def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, Floats, Array] | None:
     """The picture straightened: the gradient's double angle as complex numbers, weights, view -> map."""
     height, width = known.shape
-    x, y = np.meshgrid(np.linspace(0, width - 1, 17), np.linspace(0, height - 1, 17))
-    plane = np.linalg.inv(map_from_plane) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
-    if plane[2].max() <= 0:
+    canvas = view_canvas(map_from_plane, Size(width, height), side=_CANVAS, depth_range=_DEPTH_RANGE)
+    if canvas is None:
         return None
-    near = plane[2] >= plane[2].max() / _DEPTH_RANGE  # the third row is 1 / depth
-    points = plane[:2, near] / plane[2, near]
-    low, high = points.min(1), points.max(1)
-    unit = float((high - low).max()) / (_CANVAS - 1)
-    corner = (low + high) / 2 - unit * (_CANVAS - 1) / 2
-    map_from_view = map_from_plane @ np.array([[unit, 0, corner[0]], [0, unit, corner[1]], [0, 0, 1.0]])
-    rows, columns = np.mgrid[0:_CANVAS, 0:_CANVAS]
-    depth = map_from_view[2, 0] * columns + map_from_view[2, 1] * rows + map_from_view[2, 2]
+    map_from_view = map_from_plane @ canvas.plane_from_view
+    depth = depth_of_view(map_from_view, _CANVAS)
 
     def warped(planes: Floats) -> Floats:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -218,10 +213,7 @@ def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, F
     tensor = double_angle(np.asarray(cv2.GaussianBlur(warped(lab), (0, 0), 0.8), np.float32)) * seen
     energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.08 * _CANVAS)
     tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
-    nearest = depth[seen > 0].min()
-    # Evenly in the photo, so that a pose that blows up a few pixels does not win.
-    weights = seen * (nearest / np.maximum(depth, nearest)) ** 1.5
-    return tensor, weights.astype(np.float32), map_from_view
+    return tensor, even_weights(seen, depth), map_from_view
 
 
 def double_angle(lab: Floats) -> NDArray[np.complex64]:
