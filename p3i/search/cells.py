@@ -110,14 +110,24 @@ def contrast(
     every = read_cells(level, pattern, theta, (index[None] + steps[:, None]).reshape(-1, 2), grid)
     values = every.values.reshape(len(steps), len(index), *every.values.shape[1:])
     known = every.known.reshape(len(steps), len(index), -1)
-    cells = Cells(values[0], known[0])
-    found = Contrast(torch.zeros(len(index)), torch.zeros(len(index)))
+    return contrast_of(Cells(values, known), weights=weights, rounds=rounds)
+
+
+def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Contrast:
+    """The contrast [N] of cells that were read whole and at half steps.
+
+    Shapes: cells.values [1 + 2 * M, N, K, C] and known [1 + 2 * M, N, K]: the whole cells, then those M half
+    steps ahead, then those behind. `weights` [N] start the mean; then the contrast itself weighs.
+    """
+    values, known = cells.values, cells.known
+    whole = Cells(values[0], known[0])
+    found = Contrast(torch.zeros(values.shape[1]), torch.zeros(values.shape[1]))
     weights = weights.float()
     for _ in range(rounds):
-        mean, _ = mean_cell(cells, weights)
-        whole = agreement_with_others(cells, weights)
-        at_half = agreement(values[1:], mean, known[1:]).reshape(2, len(half_steps), -1)
-        found = Contrast(whole, whole - at_half.mean(0).amax(0).clamp(min=0))
+        mean, _ = mean_cell(whole, weights)
+        others = agreement_with_others(whole, weights)
+        at_half = agreement(values[1:], mean, known[1:]).unflatten(0, (2, -1))
+        found = Contrast(others, others - at_half.mean(0).amax(0).clamp(min=0))
         weights = found.contrast.clamp(min=0)
         if float(weights.sum()) <= 0:
             break

@@ -20,7 +20,7 @@ from p3i.grammar.ast import Polar
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
-from p3i.search.cells import HALF_STEPS, Cells, Contrast, agreement, agreement_with_others, mean_cell
+from p3i.search.cells import HALF_STEPS, Cells, Contrast, contrast_of
 from p3i.search.evidence import ColourMap, Evidence
 from p3i.search.register import Instances, correlate, mean_of_others
 from p3i.vision.warp import sample, sample_valid
@@ -196,18 +196,7 @@ def patch_contrast(
     cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where).cells()
     values = cells.values.reshape(len(every), len(index), *cells.values.shape[1:])
     known = cells.known.reshape(len(every), len(index), -1)
-    whole = Cells(values[0], known[0])
-    weights = torch.ones(len(index))
-    found = Contrast(torch.zeros(len(index)), torch.zeros(len(index)))
-    for _ in range(rounds):
-        mean, _ = mean_cell(whole, weights)
-        others = agreement_with_others(whole, weights)
-        at_half = agreement(values[1:], mean, known[1:]).reshape(2, len(steps), -1)
-        found = Contrast(others, others - at_half.mean(0).amax(0).clamp(min=0))
-        weights = found.contrast.clamp(min=0)
-        if float(weights.sum()) <= 0:
-            break
-    return found
+    return contrast_of(Cells(values, known), weights=torch.ones(len(index)), rounds=rounds)
 
 
 def find_objects(

@@ -14,7 +14,7 @@ from p3i.search.cells import HALF_STEPS, contrast, sample_grid
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence, Level
 from p3i.search.lens import scaled, straightened
-from p3i.search.patches import patch_contrast, spacing
+from p3i.search.patches import half_steps, patch_contrast, spacing
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
@@ -70,8 +70,8 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
     """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`."""
     index = pattern.index[seen].double()
     index = index[:: len(index) // MOST_JUDGED + 1]
-    half_steps = _half_steps(pattern)
-    if len(half_steps) < len(HALF_STEPS):  # one loop sweeps no cells: patches about the draws are compared
+    steps = half_steps(pattern)
+    if len(steps) < len(HALF_STEPS):  # one loop sweeps no cells: patches about the draws are compared
         side = spacing(pattern, pattern.theta)
         mm = evidence.focal_mm
         return score_of(
@@ -79,7 +79,7 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
         )
     side = _cell_px(evidence, pattern, index)
     return max(
-        score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=half_steps))
+        score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=steps))
         for level in (evidence.level_for(side, name=name) for name in judging_features(evidence.config))
     )
 
@@ -147,27 +147,13 @@ def _without_doubles(pattern: Pattern) -> Pattern:
     )
 
 
-def _half_steps(pattern: Pattern) -> torch.Tensor:
-    """The half steps of the indices that move the draws: a single loop has one."""
-    moving = [
-        any(
-            path.startswith("draw.") and path.endswith(f".{variable}") and value != 0
-            for path, value in zip(pattern.paths, pattern.theta.tolist(), strict=True)
-        )
-        for variable in ("i", "j")
-    ]
-    if all(moving):
-        return HALF_STEPS
-    return HALF_STEPS[:1] if moving[0] else HALF_STEPS[1:2]
-
-
 def _cell_px(evidence: Evidence, pattern: Pattern, index: torch.Tensor) -> float:
     """A typical distance of neighbours, in photo pixels: the size of what is compared."""
     level = evidence.frame
     matrix = level.map_from_plane(pattern, pattern.theta)
     here, front = project(matrix, pattern.points_at(index))
     steps = []
-    for step in _half_steps(pattern)[:2]:
+    for step in half_steps(pattern)[:2]:
         there, ahead = project(matrix, pattern.points_at(index + 2 * step))
         steps.append((there - here).norm(dim=1)[front & ahead])
     lengths = torch.cat(steps)
