@@ -72,8 +72,12 @@ class Level:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourMap:
-    """A photo's colours, reduced: `values` float32 [3, H, W] Lab, `valid` [H, W], `map_from_photo` [3, 3]."""
+    """A photo's colours, reduced: `lab` float32 [H, W, 3], `valid` [H, W], `map_from_photo` [3, 3].
 
+    `values` [3, H, W] are the same colours in the order that `vision.warp.sample` reads.
+    """
+
+    lab: np.ndarray
     values: Tensor
     valid: Tensor
     map_from_photo: Tensor
@@ -120,7 +124,7 @@ class Evidence:
             shift, scale = 0.5 / small.stride - 0.5, 1 / small.stride
             matrix = torch.tensor([[scale, 0, shift], [0, scale, shift], [0, 0, 1.0]], dtype=torch.float64)
             values = torch.from_numpy(lab).permute(2, 0, 1).contiguous()
-            self._colours[halvings] = ColourMap(values, torch.from_numpy(small.valid), matrix)
+            self._colours[halvings] = ColourMap(lab, values, torch.from_numpy(small.valid), matrix)
         return self._colours[halvings]
 
     @property

@@ -18,8 +18,6 @@ from p3i.search.session import Answer, Session
 # So many proposals are fitted, and so many fits are finished.
 _MOST_FITTED = 8
 _MOST_FINISHED = 2
-# A fit of this quality ends the fitting of further proposals but those of other counts at the same place.
-_CERTAIN = 0.3
 # So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
 _MOST_PLACES = 2
 _MUCH_BETTER = 4.0
@@ -107,10 +105,15 @@ def ring_fit(session: Session, proposal: RingProposal) -> CurveFit | None:
         "draw.x.offset.1": float(proposal.center[0]),
         "draw.y.offset.1": float(proposal.center[1]),
     }
-    first = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=proposal.focal_mm)
-    if first is None:
-        return None
-    return _followed(session, first, rounds=4)
+    return _fitted(session, filling, values, focal_mm=proposal.focal_mm, rounds=4)
+
+
+def _fitted(
+    session: Session, filling: Filling, values: dict[str, float], *, focal_mm: float, rounds: int
+) -> CurveFit | None:
+    """A filling fitted from these numbers; None where too few of its objects are in sight."""
+    start = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=focal_mm)
+    return None if start is None else _followed(session, start, rounds=rounds)
 
 
 def _followed(session: Session, fit: CurveFit, *, rounds: int) -> CurveFit:
@@ -183,15 +186,16 @@ def _extended(session: Session, fit: CurveFit) -> CurveFit:
     values = values_of(fit)
     step = 360 / count
     values |= {"draw.x.angle.j": step, "draw.x.angle.1": values["draw.x.angle.1"] + first * step}
-    arc = _arc(session, fit, values, max(length, _FEWEST))
+    filling = ring_filling(0, drawn=max(length, _FEWEST))
+    arc = _fitted(session, filling, values, focal_mm=fit.focal_mm, rounds=2)
+    if arc is None:
+        return fit
     for _ in range(_MOST_GROWTHS):
-        if arc is None:
-            return fit
         values, drawn = values_of(arc), len(arc.filling.pattern.index)
         step = values["draw.x.angle.j"]
         slots = round(360 / abs(step))
         if drawn >= slots - 1 or slots > 60:
-            closed = _closed(session, arc, values, slots)
+            closed = _fitted(session, ring_filling(slots), values, focal_mm=arc.focal_mm, rounds=3)
             return closed if closed is not None and closed.quality > 0.7 * arc.quality else arc
         values["draw.x.angle.1"] -= _REACH * step
         filling = ring_filling(0, drawn=drawn + 2 * _REACH)
@@ -204,29 +208,12 @@ def _extended(session: Session, fit: CurveFit) -> CurveFit:
         if length <= drawn:
             return arc
         values["draw.x.angle.1"] += first * step
-        grown = _arc(session, wider, values, length)
+        filling = ring_filling(0, drawn=length)
+        grown = _fitted(session, filling, values, focal_mm=arc.focal_mm, rounds=2)
         if grown is None or grown.quality < 0.5 * arc.quality:
             return arc
         arc = grown
-    return fit if arc is None else arc
-
-
-def _arc(session: Session, fit: CurveFit, values: dict[str, float], drawn: int) -> CurveFit | None:
-    """The arc of `drawn` objects with these numbers, fitted with its step free."""
-    filling = ring_filling(0, drawn=drawn)
-    arc = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
-    if arc is None:
-        return None
-    return _followed(session, arc, rounds=2)
-
-
-def _closed(session: Session, fit: CurveFit, values: dict[str, float], slots: int) -> CurveFit | None:
-    """The whole ring of which an arc is nearly all."""
-    filling = ring_filling(slots)
-    ring = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
-    if ring is None:
-        return None
-    return _followed(session, ring, rounds=3)
+    return arc
 
 
 def _best_run(fit: CurveFit, *, closed: bool = True) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from p3i.search.evidence import Evidence
 from p3i.search.phase import WEIGHTS
-from p3i.search.propose.unrolled import gradients
+from p3i.search.propose.unrolled import colours_at, gradients, polar_points
 from p3i.vision.cells import median_cell
 from p3i.vision.motif import concentration, contrast, parts, symmetry
 
@@ -115,19 +115,9 @@ def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
     reach = math.log(_REACH) + abs(step) / 2
     radii = ring.radius * np.exp(np.arange(-reach, reach, abs(step) / _SIDE))
     colours = evidence.colours_for(ring.radius * abs(step) / _SIDE * evidence.image.size.unit_px)
-    x = ring.center[0] + radii[:, None] * np.cos(angles)
-    y = ring.center[1] + radii[:, None] * np.sin(angles)
     matrix = colours.map_from_photo.numpy() @ ring.image_from_plane
-    mapped = np.stack([x, y, np.ones_like(x)], -1) @ matrix.T
-    front = mapped[..., 2] > 1e-6
-    at = (mapped[..., :2] / np.where(front, mapped[..., 2], 1.0)[..., None]).astype(np.float32)
-    maps = at[..., 0], at[..., 1]
-    height, width = colours.valid.shape
-    known = front & (at >= 0).all(-1) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
-    known &= cv2.remap(colours.valid.numpy().astype(np.float32), *maps, cv2.INTER_LINEAR) > 0.99
-    lab = np.ascontiguousarray(colours.values.permute(1, 2, 0).numpy())
-    values = cv2.remap(lab, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return Sectors(np.asarray(values, np.float32), known, radii)
+    at, known = polar_points(colours, matrix, ring.center, radii, angles)
+    return Sectors(colours_at(colours, at), known, radii)
 
 
 def _middle(

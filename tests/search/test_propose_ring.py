@@ -8,7 +8,7 @@ from drawn import DrawnRing
 from p3i.interp.camera import rotation
 from p3i.search.propose import ring
 from p3i.search.propose.poses import pose_grid
-from p3i.search.propose.ring import RingProposal, Vote, double_angle, ring_proposals, rotation_votes
+from p3i.search.propose.ring import RingProposal, Vote, gradient_tensor, ring_proposals, rotation_votes
 
 RING = DrawnRing()
 
@@ -51,7 +51,7 @@ def test_a_double_angle_turns_twice_as_fast_as_an_edge() -> None:
     for turn_deg in (0, 30, 90, 135, 210):
         turn = np.radians(turn_deg)
         ramp = (columns * np.cos(turn) + rows * np.sin(turn)).astype(np.float32)
-        angle = np.angle(double_angle(cv2.merge([ramp, 0 * ramp, 0 * ramp]))[20, 20])
+        angle = np.angle(gradient_tensor(cv2.merge([ramp, 0 * ramp, 0 * ramp]))[20, 20])
         assert np.cos(angle - 2 * turn) == pytest.approx(1, abs=1e-4)
 
 

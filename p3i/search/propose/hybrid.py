@@ -18,7 +18,7 @@ from p3i.search.cells import agreement, mean_cell
 from p3i.search.curves import CurveFit
 from p3i.search.evidence import Evidence
 from p3i.search.patches import Cells, Frames, frames, read, sample_px
-from p3i.search.propose.ring import double_angle
+from p3i.search.propose.ring import gradient_tensor
 from p3i.search.propose.views import depth_of_view, view_canvas
 from p3i.vision.warp import in_frame
 
@@ -288,8 +288,8 @@ def _alike_when_shifted(evidence: Evidence, base: BaseRing) -> tuple[Floats, flo
 
     valid = warped(colours.valid.numpy())
     known = cv2.erode(((depth > 0) & (valid > 0.99)).astype(np.uint8), np.ones((5, 5))).astype(np.float32)
-    lab = cv2.GaussianBlur(warped(colours.values.permute(1, 2, 0).numpy()), (0, 0), 0.8)
-    tensor = double_angle(np.asarray(lab, np.float32)) * known
+    lab = cv2.GaussianBlur(warped(colours.lab), (0, 0), 0.8)
+    tensor = gradient_tensor(np.asarray(lab, np.float32)) * known
     energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.04 * _CANVAS)
     tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
     corner = canvas.plane_from_view[:2, 2]

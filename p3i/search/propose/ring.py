@@ -18,7 +18,7 @@ from p3i.interp.camera import image_from_plane
 from p3i.search.evidence import Evidence
 from p3i.search.propose.ellipses import circle_seeds
 from p3i.search.propose.poses import pose_grid
-from p3i.search.propose.unrolled import Rows, best_rows, likeness, unroll
+from p3i.search.propose.unrolled import Rows, best_rows, double_angle, likeness, unroll
 from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
 from p3i.size import Size
 
@@ -81,13 +81,12 @@ class RingProposal:
 def rotation_votes(evidence: Evidence) -> list[Vote]:
     """The centres that rotations speak for, at most a few for each pose, the most votes first."""
     colours = evidence.colours_for(evidence.image.size.longer / (2.5 * _CANVAS))
-    lab = np.ascontiguousarray(colours.values.permute(1, 2, 0).numpy())
     known = colours.valid.numpy().astype(np.float32)
     size, map_from_photo = evidence.image.size, colours.map_from_photo.numpy()
     found: list[Vote] = []
     for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, _MOST_TILT_DEG):
         seen = image_from_plane(rx_deg, ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
-        view = _view(lab, known, map_from_photo @ seen)
+        view = _view(colours.lab, known, map_from_photo @ seen)
         if view is None:
             continue
         tensor, weights, map_from_view = view
@@ -210,19 +209,18 @@ def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, F
     seen[:, :2] = seen[:, -2:] = 0
     if not seen.any():
         return None
-    tensor = double_angle(np.asarray(cv2.GaussianBlur(warped(lab), (0, 0), 0.8), np.float32)) * seen
+    tensor = gradient_tensor(np.asarray(cv2.GaussianBlur(warped(lab), (0, 0), 0.8), np.float32)) * seen
     energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.08 * _CANVAS)
     tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
     return tensor, even_weights(seen, depth), map_from_view
 
 
-def double_angle(lab: Floats) -> NDArray[np.complex64]:
-    """sqrt(|grad|) times e^(2i direction) of the colours [H, W, 3] together, as vision/oriented.py has it."""
+def gradient_tensor(lab: Floats) -> NDArray[np.complex64]:
+    """The gradient of a picture [H, W, 3] as complex numbers: sqrt(|grad|) times e^(2i direction)."""
     gx = 0.5 * (np.roll(lab, -1, 1) - np.roll(lab, 1, 1))
     gy = 0.5 * (np.roll(lab, -1, 0) - np.roll(lab, 1, 0))
-    squared = (gx * gx + gy * gy).sum(2)
-    z = (gx * gx - gy * gy).sum(2) + 2j * (gx * gy).sum(2)
-    return (z * (squared**0.25 / (squared + 0.4**2))).astype(np.complex64)
+    _, cosine, sine = double_angle(gx, gy)
+    return (cosine + 1j * sine).astype(np.complex64)
 
 
 def _votes(tensor: NDArray, weights: Floats) -> Floats:

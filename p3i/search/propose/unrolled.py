@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
-from p3i.search.evidence import Evidence
+from p3i.search.evidence import ColourMap, Evidence
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -32,6 +32,8 @@ _LEAST_ENERGY = 0.15
 _LEAST_KNOWN = 0.35
 # What is near a radius: up to this factor.
 _NEAR = 1.5
+# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
+_FLOOR = 0.4
 # At most so many readings of a strip are told.
 _MOST_ROWS = 4
 _ALL_COUNTS = range(_COUNTS[0], _COUNTS[1] + 1)
@@ -80,10 +82,27 @@ def unroll(
     matrix = colours.map_from_photo.numpy() @ image_from_plane(*pose, size=size, focal_mm=focal_mm).numpy()
     low, high = _RADII if about is None else (about / _NEAR, about * _NEAR)
     radii = np.exp(np.arange(math.log(low), math.log(high), _ROW_STEP))
-    angles = np.arange(_ANGLES) * _STEP
+    angles = np.arange(_ANGLES, dtype=float) * _STEP
+    at, known = polar_points(colours, matrix, center, radii, angles)
+    enough = np.flatnonzero(known.mean(1) > 0.3)
+    if len(enough) < 8:
+        return None
+    rows = slice(0, int(enough[-1]) + 1)
+    known, radii = known[rows], radii[rows]
+    strip = colours_at(colours, at[rows])
+    return Strip(*_features(strip, known), radii)
+
+
+def polar_points(
+    colours: ColourMap, map_from_plane: Array, center: Array, radii: Array, angles: Array
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Where the circles of `radii` [R] about `center` lie on a map of colours, at `angles` [T] (radians).
+
+    Returns map pixels [R, T, 2] and which of them can be read [R, T].
+    """
     x = center[0] + radii[:, None] * np.cos(angles)
     y = center[1] + radii[:, None] * np.sin(angles)
-    mapped = np.stack([x, y, np.ones_like(x)], -1) @ matrix.T
+    mapped = np.stack([x, y, np.ones_like(x)], -1) @ map_from_plane.T
     front = mapped[..., 2] > 1e-6
     at = (mapped[..., :2] / np.where(front, mapped[..., 2], 1.0)[..., None]).astype(np.float32)
     height, width = colours.valid.shape
@@ -91,14 +110,24 @@ def unroll(
     if not bool(colours.valid.all()):
         mask = colours.valid.numpy().astype(np.float32)
         known &= cv2.remap(mask, at[..., 0], at[..., 1], cv2.INTER_LINEAR) > 0.99
-    enough = np.flatnonzero(known.mean(1) > 0.3)
-    if len(enough) < 8:
-        return None
-    rows = slice(0, int(enough[-1]) + 1)
-    known, at, radii = known[rows], at[rows], radii[rows]
-    lab = np.ascontiguousarray(colours.values.permute(1, 2, 0).numpy())
-    strip = cv2.remap(lab, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return Strip(*_features(strip, known), radii)
+    return at, known
+
+
+def colours_at(colours: ColourMap, at: Floats) -> Floats:
+    """The colours [R, T, 3] at map pixels [R, T, 2]; beyond the map its nearest pixels."""
+    taken = cv2.remap(colours.lab, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(taken, np.float32)
+
+
+def double_angle(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """sqrt(|grad|), and that times the cosine and the sine of twice the direction, of all colours together.
+
+    Shapes: gx, gy [H, W, 3] -> three [H, W]; as vision/oriented.py has it for each colour.
+    """
+    squared = (gx * gx + gy * gy).sum(2)
+    root = squared**0.25
+    factor = root / (squared + _FLOOR**2)
+    return root, (gx * gx - gy * gy).sum(2) * factor, 2 * (gx * gy).sum(2) * factor
 
 
 def gradients(lab: NDArray) -> Floats:
@@ -108,10 +137,7 @@ def gradients(lab: NDArray) -> Floats:
     inner = smooth[:, 4:-4]
     gy = np.zeros_like(inner)
     gy[1:-1] = 0.5 * (inner[2:] - inner[:-2])
-    squared = (gx * gx + gy * gy).sum(2)
-    factor = squared**0.25 / (squared + 0.4**2)
-    values = [squared**0.25, (gx * gx - gy * gy).sum(2) * factor, 2 * (gx * gy).sum(2) * factor]
-    return np.stack(values).astype(np.float32)
+    return np.stack(double_angle(gx, gy)).astype(np.float32)
 
 
 def _features(lab: NDArray, known: NDArray) -> tuple[Floats, NDArray[np.bool_]]:
