@@ -13,9 +13,10 @@ from dataclasses import replace
 from p3i.grammar.ast import Polar, Program
 from p3i.grammar.leaves import leaves
 from p3i.interp.compile import compile
-from p3i.interp.unroll import distinct, nest
+from p3i.interp.unroll import nest
 from p3i.search.evidence import Evidence
 from p3i.search.patches import patch_contrast, spacing
+from p3i.search.score import without_doubles
 from p3i.search.session import Answer
 from p3i.vision.warp import in_frame
 
@@ -49,14 +50,11 @@ def by_explained(evidence: Evidence, answers: list[list[Answer]]) -> list[Answer
 
 def explained_bits(evidence: Evidence, answer: Answer) -> float:
     """What a program explains of the photo less what it costs, in bits; negative where it costs more."""
-    pattern = compile(answer.program)
+    pattern = without_doubles(compile(answer.program))
     focal_mm = answer.focal_mm or evidence.focal_mm
     size = evidence.image.size
     points, in_front = pattern.centers_px(size=size, focal_mm=focal_mm)
-    seen = in_front & in_frame(points, size)
-    kept = distinct([(x, y, 0, 0) for x, y in pattern.centers().tolist()])
-    seen = seen[kept]
-    index = pattern.index[kept][seen].double()
+    index = pattern.index[in_front & in_frame(points, size)].double()
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return -cost

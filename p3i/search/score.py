@@ -57,7 +57,7 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
         free = straightened(image, k1)
         image, program, focal_mm = free.image, scaled(program, 1 / free.scale), focal_mm / free.scale
     evidence = Evidence(image, config, focal_mm)
-    pattern = _without_doubles(compile(program))
+    pattern = without_doubles(compile(program))
     points, in_front = pattern.centers_px(size=image.size, focal_mm=focal_mm)
     seen = in_front & in_frame(points, image.size)
     if int(seen.sum()) < 2:
@@ -131,7 +131,7 @@ def _equation2(
     return float(difference.square().sum()), len(pairs)
 
 
-def _without_doubles(pattern: Pattern) -> Pattern:
+def without_doubles(pattern: Pattern) -> Pattern:
     """The pattern with draws that coincide kept once (DESIGN.md, 2.2)."""
     centers = pattern.centers().tolist()
     kept = distinct([(x, y, 0, 0) for x, y in centers])
