@@ -13,7 +13,7 @@ from torch import Tensor
 from p3i.interp.camera import project
 from p3i.search.curves import CurveFit, measured
 from p3i.search.evidence import Evidence
-from p3i.search.patches import SIDE, Frames, frames, offsets_grid, sample_px
+from p3i.search.patches import Frames, frames, offsets_grid, sample_px
 from p3i.vision.warp import sample, sample_valid
 
 # Samples on each side of the middle, in all this many patch sides wide.
@@ -68,7 +68,7 @@ def _lead(patch: _MeanPatch) -> float:
 def _mean_patch(evidence: Evidence, fit: CurveFit, where: Frames) -> _MeanPatch:
     offsets = _WIDE * offsets_grid(_COUNT, samples_a_side=_COUNT).reshape(-1, 2)
     matrix = fit.filling.pattern.image_from_plane(fit.theta, size=evidence.image.size, focal_mm=fit.focal_mm)
-    colours = evidence.colours_for(sample_px(matrix, where, side=SIDE))
+    colours = evidence.colours_for(sample_px(matrix, where))
     at, front = project(colours.map_from_photo @ matrix, where.points(offsets))
     known = (front & sample_valid(colours.valid, at.float())).double()
     weight = known * (fit.contrast.clamp(min=0).double() + 1e-6)[:, None]

@@ -18,7 +18,6 @@ from p3i.search.evidence import Evidence
 from p3i.search.patches import patch_contrast, spacing
 from p3i.search.score import without_doubles
 from p3i.search.session import Answer
-from p3i.vision.warp import in_frame
 
 # Samples of a patch that count as independent of each other: about 7 x 7.
 _SAMPLES = 50
@@ -52,9 +51,7 @@ def explained_bits(evidence: Evidence, answer: Answer) -> float:
     """What a program explains of the photo less what it costs, in bits; negative where it costs more."""
     pattern = without_doubles(compile(answer.program))
     focal_mm = answer.focal_mm or evidence.focal_mm
-    size = evidence.image.size
-    points, in_front = pattern.centers_px(size=size, focal_mm=focal_mm)
-    index = pattern.index[in_front & in_frame(points, size)].double()
+    index = pattern.index[evidence.in_sight(pattern, focal_mm=focal_mm)].double()
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return -cost

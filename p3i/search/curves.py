@@ -15,7 +15,6 @@ from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
 from p3i.search.patches import Frames, find_objects, frames, patch_contrast, spacing
 from p3i.search.register import robust_fit
-from p3i.vision.warp import in_frame
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
@@ -80,9 +79,7 @@ def measured(
     pattern = filling.pattern
     if side is None:
         side = spacing(pattern, theta)
-    index = pattern.index.double()
-    points, in_front = pattern.centers_px(theta, size=evidence.image.size, focal_mm=focal_mm)
-    index = index[in_front & in_frame(points, evidence.image.size)]
+    index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
     if len(index) < _FEWEST:
         return None
     found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)

@@ -15,6 +15,7 @@ from p3i.vision.features import FeatureMap, extract
 from p3i.vision.fill import filled
 from p3i.vision.image import Image, resized
 from p3i.vision.lab import lab_of
+from p3i.vision.warp import in_frame
 
 COARSE = 320
 """Longer side, in pixels, of the map on which patterns with large cells are found."""
@@ -126,6 +127,14 @@ class Evidence:
             values = torch.from_numpy(lab).permute(2, 0, 1).contiguous()
             self._colours[halvings] = ColourMap(lab, values, torch.from_numpy(small.valid), matrix)
         return self._colours[halvings]
+
+    def in_sight(
+        self, pattern: Pattern, theta: Tensor | None = None, *, focal_mm: float | None = None
+    ) -> Tensor:
+        """Which of a program's draws the photo shows, [N] bool; by its own numbers and the focal assumed."""
+        size = self.image.size
+        points, in_front = pattern.centers_px(theta, size=size, focal_mm=focal_mm or self.focal_mm)
+        return in_front & in_frame(points, size)
 
     @property
     def frame(self) -> Level:

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves, with_leaves
-from p3i.grammar.sketch import Hole, Sketch
+from p3i.grammar.sketch import Hole, Sketch, parse_sketch
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import edges, live_indices, nest
@@ -158,6 +158,13 @@ def fillings(
         settings = _spread(sketch, counts, values, extents, most_indices, most_settings)
         if settings:
             yield _filling(sketch, moving, counts, extents, values, settings)
+
+
+def filling_of(text: str) -> Filling:
+    """The filling of a sketch that the search itself spells: one setting, all else to be found."""
+    sketch = parse_sketch(text)
+    assert isinstance(sketch, Sketch), sketch
+    return next(fillings(sketch, unknowns_of(sketch), most_indices=1000, most_settings=1))
 
 
 def with_settings(filling: Filling, settings: tuple[tuple[int, ...], ...]) -> Filling:

@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.search.curves import CurveFit, curve_score, follow, measured
-from p3i.search.fill import Filling, fillings, unknowns_of
+from p3i.search.fill import Filling, filling_of
 from p3i.search.propose.hybrid import BaseRing, HybridProposal, ring_repeated, rings_around
 from p3i.search.rings import answer_of, found_rings, numbers_of, values_of
 from p3i.search.session import Answer, Session
@@ -130,9 +129,7 @@ def hybrid_filling(proposal: HybridProposal) -> Filling:
         f"    for j in range(0, {stop}):\n"
         f"        Draw(x={radius}*Cos({angle}) + {x}, y={radius}*Sin({angle}) + {y})\n"
     )
-    sketch = parse_sketch(text)
-    assert isinstance(sketch, Sketch), sketch
-    return next(fillings(sketch, unknowns_of(sketch), most_indices=1000, most_settings=1))
+    return filling_of(text)
 
 
 def _base_of(fit: CurveFit) -> BaseRing:

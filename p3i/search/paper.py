@@ -144,8 +144,7 @@ def _answer(evidence: Evidence, numbers: Tensor, *, loss: float) -> Answer | Non
     layout = filling_layout(evidence, lattice_pattern(), Layout(lattice, (0, 1), (0, 1)))
     program = layout.program(from_zero=not evidence.config.strict)
     pattern = compile(program)
-    points, front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
-    seen = front & in_frame(points, evidence.image.size)
+    seen = evidence.in_sight(pattern)
     if not math.isfinite(loss) or int(seen.sum()) < 4:
         return None
     return Answer(program, "lattice", normalised_score(evidence, pattern, seen), 1 / (1 + loss))

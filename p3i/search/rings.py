@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.camera import Camera
 from p3i.search.curves import CurveFit, curve_score, follow, measured
-from p3i.search.fill import Filling, fillings, unknowns_of
+from p3i.search.fill import Filling, filling_of
 from p3i.search.propose.ring import RingProposal, ring_proposals
 from p3i.search.result import StructureFound
 from p3i.search.sector import Place, Ring, places
@@ -89,9 +88,7 @@ def ring_filling(count: int, *, drawn: int | None = None) -> Filling:
         f"for j in range(0, {count if drawn is None else drawn}):\n"
         f"    Draw(x=?r*Cos({angle}) + ?x, y=?r*Sin({angle}) + ?y)\n"
     )
-    sketch = parse_sketch(text)
-    assert isinstance(sketch, Sketch), sketch
-    return next(fillings(sketch, unknowns_of(sketch), most_indices=1000, most_settings=1))
+    return filling_of(text)
 
 
 def ring_fit(session: Session, proposal: RingProposal) -> CurveFit | None:

@@ -31,7 +31,6 @@ from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
 from p3i.search.score import normalised_score
 from p3i.search.session import Answer, Session
-from p3i.vision.warp import in_frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,8 +218,7 @@ def _gains(session: Session, wide: Filling, z: Tensor, *, side: float, typical: 
     """What drawing each index gains, [N]: its contrast beyond what an object must have; 0 out of sight."""
     evidence = session.evidence
     theta = wide.theta(z)
-    points, front = wide.pattern.centers_px(theta, size=evidence.image.size, focal_mm=evidence.focal_mm)
-    seen = front & in_frame(points, evidence.image.size)
+    seen = evidence.in_sight(wide.pattern, theta)
     gains = torch.full((len(seen),), -0.02 * typical, dtype=torch.float64)
     if int(seen.sum()) >= 3:
         index = wide.pattern.index[seen].double()
@@ -264,8 +262,7 @@ def program_score(session: Session, program: Program) -> float:
     """The normalised score of a program, as `p3i score` gives it; 0 where too little of it is in sight."""
     evidence = session.evidence
     pattern = compile(program)
-    points, front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
-    seen = front & in_frame(points, evidence.image.size)
+    seen = evidence.in_sight(pattern)
     if int(seen.sum()) < 4:
         return 0.0
     return normalised_score(evidence, pattern, seen)
