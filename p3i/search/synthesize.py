@@ -120,7 +120,7 @@ def _found(session: Session) -> list[Answer]:
             answers.append(walk(session))
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
-    return by_explained(session.evidence, answers)
+    return by_explained(session.evidence, answers, needed=needed_for(session.config))
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
