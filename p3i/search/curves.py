@@ -86,8 +86,13 @@ def measured(
     return CurveFit(filling, z, focal_mm, side, index, found.contrast)
 
 
-def registered(evidence: Evidence, fit: CurveFit, *, free_focal: bool = False) -> CurveFit | None:
-    """One round: find the objects around their places, fit the numbers to where they are; None if too few."""
+def registered(
+    evidence: Evidence, fit: CurveFit, *, free_focal: bool = False, keep_side: bool = False
+) -> CurveFit | None:
+    """One round: find the objects around their places, fit the numbers to where they are; None if too few.
+
+    `keep_side`: the patches stay as wide as they are, whatever becomes of the distance of the draws.
+    """
     filling, pattern = fit.filling, fit.filling.pattern
     weights = fit.contrast.clamp(min=0.02)
     found = find_objects(
@@ -129,15 +134,18 @@ def registered(evidence: Evidence, fit: CurveFit, *, free_focal: bool = False) -
     )
     residual = torch.einsum("nij,nj->ni", whiten, points_of(numbers) - targets)
     cost = float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())
-    moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm)
+    side = fit.side if keep_side else None
+    moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm, side=side)
     return None if moved is None else replace(moved, cost=cost)
 
 
-def follow(evidence: Evidence, fit: CurveFit, *, rounds: int, free_focal: bool = False) -> CurveFit:
-    """The best of some rounds of registration."""
+def follow(
+    evidence: Evidence, fit: CurveFit, *, rounds: int, free_focal: bool = False, keep_side: bool = False
+) -> CurveFit:
+    """The best of some rounds of registration; the options are those of `registered`."""
     best = now = fit
     for _ in range(rounds):
-        moved = registered(evidence, now, free_focal=free_focal)
+        moved = registered(evidence, now, free_focal=free_focal, keep_side=keep_side)
         if moved is None:
             break
         settled = abs(moved.mean - now.mean) < 0.003 and moved.cost > 0.98 * now.cost
