@@ -3,15 +3,15 @@
 One measure for all, in bits (minimum description length, Rissanen 1978; the paper itself compares programs of
 one structure only, by its equation 2):
 
-    worth = sum over the objects in sight but one of  S/2 * log2(0.9 * (1 - half + e) / (1 - whole + e))  -  cost
+    worth = sum over the objects in sight but one of S/2 * log2(0.9 * (1 - half + e) / (1 - whole + e)) - cost
 
 `whole` is an object's agreement with the mean patch of the others, `half` the best agreement that this mean
-reaches half a step away, so 1 - whole and 1 - half are the shares of the patch's energy that remain to be told
-once it is predicted: by the program, and by the same picture without the program's places. A Gaussian code
-saves half the logarithm of their ratio for each of S independent samples; e is what stays unpredictable
-whatever is known, and a tenth is what the best of thousands of programs predicts of any picture by chance. One
-object is not counted, since the mean patch itself is learnt. What a program costs: its numbers, bounds and
-guards, written down to the precision that matters.
+reaches half a step away, so 1 - whole and 1 - half are the shares of the patch's energy that remain to be
+told once it is predicted: by the program, and by the same picture without the program's places. A Gaussian
+code saves half the logarithm of their ratio for each of S independent samples. e is what stays unpredictable
+whatever is known, and the factor 0.9 takes off what the best of thousands of programs predicts of any picture
+by chance. One object is not counted, since the mean patch itself is learnt. What a program costs: its
+numbers, bounds and guards, written down to the precision that matters.
 """
 
 import math
@@ -24,9 +24,10 @@ from torch import Tensor
 from p3i.grammar.ast import Polar, Program
 from p3i.grammar.leaves import leaves
 from p3i.interp.compile import compile
+from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.evidence import Evidence
-from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing
+from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing, turning
 from p3i.search.score import without_doubles
 from p3i.search.session import Answer
 
@@ -44,8 +45,8 @@ _WHOLE_BITS = 5.0
 _PRODUCTION_BITS = 2.0
 # More objects than this are judged by a part of them.
 _MOST_JUDGED = 300
-# An object is drawn by another program too where that has one within this share of either's spacing; a program
-# holds another where it draws so much of it.
+# Two programs draw the same object where it lies closer than this share of either spacing; a program holds
+# another where it draws so much of it.
 _SAME_PLACE = 0.25
 _HELD = 0.9
 
@@ -73,9 +74,9 @@ def by_explained(
     """The answers of several families, each list in its own order, as one list: most bits explained first.
 
     Every answer's `worth` becomes what it explains. Within a family the order stays, since that family knows
-    its own programs best; only those whose score is not `needed` stand in no other's way. A hybrid that holds
-    a ring, drawing its objects and more, says all that the ring says: it is worth at least as much, and what
-    its further objects explain beyond its higher cost.
+    its own programs best; what is no answer (a score below `needed`, or no bits) stands in no other's way. A
+    hybrid that holds a ring, drawing its objects and more, says all that the ring says: it is worth at least
+    as much, and what its further objects explain beyond its higher cost.
     """
     told = [[(answer, explained(evidence, answer)) for answer in family] for family in answers]
     rings = [by_itself for family in told for answer, by_itself in family if answer.structure == "circular"]
@@ -86,7 +87,7 @@ def by_explained(
             held = rings if answer.structure == "hybrid" else ()
             bits = max([by_itself.bits, *(_beyond(by_itself, ring) for ring in held)])
             together.append(replace(answer, worth=min(most, bits)))
-            if answer.score >= needed:
+            if answer.score >= needed and bits > 0:
                 most = min(most, bits)
     return sorted(together, key=lambda answer: -answer.worth)
 
@@ -105,7 +106,7 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
     if len(index) < 2:
         return Explained(-cost, cost, len(index), torch.zeros(0), torch.zeros(0, 2), torch.zeros(0))
     judged = index[:: len(index) // _MOST_JUDGED + 1]
-    side = spacing(pattern, pattern.theta)
+    side = _patch_side(pattern)
     found = patch_contrast(evidence, pattern, pattern.theta, judged, side=side, focal_mm=focal_mm)
     matrix = pattern.image_from_plane(pattern.theta, size=evidence.image.size, focal_mm=focal_mm)
     side_px = SIDE * sample_px(matrix, frames(pattern, pattern.theta, judged, side=side))
@@ -117,6 +118,16 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
     apart[apart < 1e-6] = math.inf
     bits = float(each.mean()) * (len(index) - 1) - cost
     return Explained(bits, cost, len(index), each, places, apart.amin(1))
+
+
+def _patch_side(pattern: Pattern) -> float:
+    """How wide patches are, in program units: as far as draws lie apart, on rings where they lie closest."""
+    if turning(pattern) != 1:
+        return spacing(pattern, pattern.theta)
+    centers = pattern.centers(pattern.theta)
+    apart = torch.cdist(centers, centers).fill_diagonal_(math.inf).amin(1)
+    rings = pattern.index[:, 0]
+    return min(float(apart[rings == i].median()) for i in rings.unique())
 
 
 def _bits(whole: Tensor, contrast: Tensor, samples: float) -> Tensor:

@@ -10,6 +10,7 @@ import numpy as np
 
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, filling_of
+from p3i.search.patches import spacing
 from p3i.search.propose.hybrid import BaseRing, HybridProposal, ring_repeated, rings_around
 from p3i.search.rings import answer_of, found_rings, numbers_of, values_of
 from p3i.search.session import Answer, Session
@@ -19,8 +20,10 @@ _LEAST_QUALITY = 0.15
 _FEWEST = 4
 # More rings are believed where their objects agree at least so well, compared with the ring's own.
 _KEPT_QUALITY = 0.6
-# Every ring of a hybrid has at least this share of the contrast of the plainest.
+# Every ring of a hybrid has at least this share of the contrast of the plainest, and so many objects in
+# sight: through two points there are circles anywhere.
 _LEAST_RING = 0.25
+_FEWEST_SEEN = 3
 # A ring that goes round this far is taken for a whole one.
 _CLOSED_DEG = 300.0
 _MOST_GROWTHS = 4
@@ -107,7 +110,7 @@ def _grown(session: Session, fit: CurveFit, proposal: HybridProposal) -> CurveFi
                 continue
             if _evenly_sure(more) and more.mean > _KEPT_QUALITY * now.mean:
                 moved = follow(session.evidence, more, rounds=2, free_focal=session.focal_is_free)
-                whole = measured(session.evidence, filling, moved.z, focal_mm=moved.focal_mm)
+                whole = measured(session.evidence, filling, moved.z, focal_mm=moved.focal_mm, side=fit.side)
                 if whole is not None:
                     fit, proposal = replace(whole, cost=moved.cost), wider
                     break
@@ -160,10 +163,13 @@ def _fitted(session: Session, ring: CurveFit, proposal: HybridProposal) -> Curve
         "draw.x.offset.i": proposal.along[0],
         "draw.y.offset.i": proposal.along[1],
     }
-    start = measured(session.evidence, filling, numbers_of(filling, values), focal_mm=ring.focal_mm)
+    numbers = numbers_of(filling, values)
+    # Where the rings of a fan lie far apart, patches as wide as its draws do are too wide for its inner ring.
+    side = min(spacing(filling.pattern, filling.theta(numbers)), ring.side)
+    start = measured(session.evidence, filling, numbers, focal_mm=ring.focal_mm, side=side)
     if start is None or start.mean < 0.5 * _KEPT_QUALITY * ring.mean:
         return None
-    return follow(session.evidence, start, rounds=3, free_focal=session.focal_is_free)
+    return follow(session.evidence, start, rounds=3, free_focal=session.focal_is_free, keep_side=True)
 
 
 def _holds(fit: CurveFit, ring: CurveFit) -> bool:
@@ -174,7 +180,15 @@ def _holds(fit: CurveFit, ring: CurveFit) -> bool:
 
 
 def _evenly_sure(fit: CurveFit) -> bool:
-    """Whether there are several rings, and each has objects."""
-    rings = fit.index[:, 0]
-    means = [float(fit.contrast[rings == i].mean()) for i in rings.unique()]
-    return len(means) > 1 and min(means) >= _LEAST_RING * max(means)
+    """Whether there are several rings, with enough of each in sight to tell, and most objects of each there.
+
+    The median, not the mean: a ring that crosses another one has a few of that one's objects for its own.
+    """
+    rings, drawn = fit.index[:, 0], fit.filling.pattern.index[:, 0]
+    typical: list[float] = []
+    for i in rings.unique():
+        own = fit.contrast[rings == i]
+        if len(own) < min(_FEWEST_SEEN, int((drawn == i).sum())):
+            return False
+        typical.append(float(own.quantile(0.5)))
+    return len(typical) > 1 and min(typical) >= _LEAST_RING * max(typical)

@@ -37,6 +37,7 @@ class StopReason(Enum):
     TIME_UP = "the time was up before the search had ended"
     INTERRUPTED = "interrupted before the search had ended"
     NO_PATTERN = "no regular pattern"
+    COSTS_MORE = "no regular pattern: what repeats is less than the program takes to write"
     NO_FIT = "the sketch does not fit this photo"
     TOO_SMALL = "the picture is too small to hold a pattern"
     FLAT = "the picture has too little contrast to hold a pattern"
@@ -68,6 +69,8 @@ class SynthesisResult:
     `lens_k1` is the radial distortion of the photo that `program` holds on (docs/geometry.md), None where it
     was seen as a pinhole camera's; `centers` lie on the photo as it is. `region` is the part of the photo
     where the program holds: a convex polygon around the cells of its objects, (x, y) in pixels.
+    `mirrored` is the other tilt, (rx, ry) in degrees, that a ring's objects fit about as well, None where the
+    two can be told apart.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
     """
 
@@ -86,6 +89,7 @@ class SynthesisResult:
     region: tuple[tuple[float, float], ...] = ()
     features: str = ""
     seed: int = 0
+    mirrored: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -3,6 +3,7 @@
 import numpy as np
 
 from p3i.grammar.ast import Program
+from p3i.interp.camera import Camera
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
 from p3i.search.choose import by_explained
 from p3i.search.config import SearchConfig
@@ -10,6 +11,7 @@ from p3i.search.distinct import distinct_answers
 from p3i.search.evidence import FINE, Evidence
 from p3i.search.focal import with_own_focal
 from p3i.search.lens import find_with_lens
+from p3i.search.mirrored import ambiguity_note, mirrored_camera
 from p3i.search.region import centers_px, region_px
 from p3i.search.result import (
     FOCAL_REASONS,
@@ -63,16 +65,21 @@ def synthesize(
     needed = needed_for(config)
     if config.focal_mm == "auto" and config.sketch is None and config.start is None:
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
-    answers = distinct_answers(answers, size=image.size, focal_mm=focal_mm)
-    good = [answer for answer in answers if answer.score >= needed]
+    sure = [answer for answer in answers if answer.score >= needed]
+    # What a person asked for is theirs to choose, whatever it costs.
+    good = sure if asked_for(config) is not None else [answer for answer in sure if answer.worth > 0]
     if not good:
         best = max((answer.score for answer in answers), default=0.0)
-        refused = result(None, session.stopped or why_not(config), score=best, needed=needed)
+        reason = StopReason.COSTS_MORE if sure else why_not(config)
+        refused = result(None, session.stopped or reason, score=best, needed=needed)
         session.record("answer", program=None, score=best, reason=refused.reason)
         return refused
+    good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
     first = good[0]
-    runner_up = max((answer.worth for answer in answers if answer is not first), default=0.0)
+    runner_up = max((answer.worth for answer in good[1:]), default=0.0)
     margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
+    other = _mirrored(session, first)
+    notes = first.notes if other is None else (*first.notes, ambiguity_note(other))
     session.tell("done", 1.0)
     session.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return result(
@@ -94,7 +101,8 @@ def synthesize(
         centers=centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         lens_k1=first.lens_k1,
-        notes=first.notes,
+        mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
+        notes=notes,
         **_focal_facts(first, assumed),
     )
 
@@ -121,6 +129,17 @@ def _found(session: Session) -> list[Answer]:
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
     return by_explained(session.evidence, answers, needed=needed_for(session.config))
+
+
+def _mirrored(session: Session, answer: Answer) -> Camera | None:
+    """The other tilt that a ring leaves open; more than one circle tells the tilt, and no time is no look."""
+    if answer.structure != "circular" or answer.lens_k1 is not None or session.stopped is not None:
+        return None
+    try:
+        return mirrored_camera(session.evidence, answer)
+    except KeyboardInterrupt:
+        session.stopped = StopReason.INTERRUPTED
+        return None
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:

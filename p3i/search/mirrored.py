@@ -1,0 +1,145 @@
+"""The two-fold ambiguity of a tilted circle: the pose mirrored at the line of sight, where it fits as well.
+
+Seen from far away, a circle and everything on it look the same whether the plane leans to one side or to the
+other: only perspective, by which near objects are larger and further apart, tells which (the two planes that
+cut a cone in circles; Forsyth et al., Invariant descriptors for 3-D object recognition and pose, PAMI 1991).
+Whether the objects of an answer tell is asked of the answer itself: its mirror image is fitted to them too.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from p3i.grammar.ast import Program
+from p3i.grammar.leaves import leaves
+from p3i.interp.camera import Camera
+from p3i.search.curves import CurveFit, measured, registered
+from p3i.search.evidence import Evidence
+from p3i.search.fill import Filling, fillings, start_values, unknowns_of, whole_program_sketch
+from p3i.search.session import Answer
+from p3i.size import Size
+
+Array = NDArray[np.float64]
+
+# Poses that lie no further apart are one.
+_SAME_DEG = 5.0
+# The mirrored pose fits as well where the logarithm of the misfits' ratio, times the objects, is below this
+# (an F-test, as for the focal in rings.py), and the objects agree no less than this share of the answer's.
+_TELLS = 6.0
+_AS_ALIKE = 0.9
+_LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
+_ROUNDS = 2
+# A step of the angle whose multiple comes back to within so much closes a ring, and stays.
+_CLOSED_DEG = 1e-6
+# Of more objects no tilt is in doubt.
+_MOST_OBJECTS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class _Turned:
+    """A similarity of the plane: complex numbers, p -> factor * p + shift with p = x + y*1j."""
+
+    factor: complex
+    shift: complex
+
+
+def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
+    """The other camera that the objects of rings fit about as well as the answer's, if there is one.
+
+    None for a program whose draws do not go round a circle, and where the objects tell the two poses apart.
+    """
+    filling = _filling(answer.program)
+    if filling is None:
+        return None
+    focal_mm = answer.focal_mm or evidence.focal_mm
+    camera = Camera.of(answer.program, focal_mm=focal_mm)
+    as_written = start_values(filling)
+    own = None if as_written is None else _fit(evidence, filling, as_written, focal_mm)
+    if own is None:
+        return None
+    start = _mirror_image(own, camera, evidence.image.size)
+    other = None if start is None else _fit(evidence, filling, start, focal_mm)
+    if other is None:
+        return None
+    values = dict(zip((unknown.name for unknown in filling.moving), other.z.tolist(), strict=True))
+    found = Camera(values["camera.rx"], values["camera.ry"], focal_mm)
+    apart = math.degrees(math.acos(min(1.0, abs(float(np.dot(found.normal, camera.normal))))))
+    misfits = [min(fit.cost, _WORST_MISFIT) + _LEAST_MISFIT for fit in (own, other)]
+    told = len(own.contrast) * math.log(misfits[1] / misfits[0])
+    if apart < _SAME_DEG or told > _TELLS or other.mean < _AS_ALIKE * own.mean:
+        return None
+    return found
+
+
+def ambiguity_note(camera: Camera) -> str:
+    """What to say of an answer whose mirrored pose is as good."""
+    return (
+        "the tilt may as well be the mirrored one "
+        f"(rx={camera.rx_deg:.1f}, ry={camera.ry_deg:.1f}): the objects do not tell which"
+    )
+
+
+def _fit(evidence: Evidence, filling: Filling, z: torch.Tensor, focal_mm: float) -> CurveFit | None:
+    """A few rounds of registration: the last, since where misfits are compared all have gone as far."""
+    fit = measured(evidence, filling, z, focal_mm=focal_mm)
+    for _ in range(_ROUNDS):
+        fit = None if fit is None else registered(evidence, fit, keep_side=True)
+    return fit
+
+
+def _filling(program: Program) -> Filling | None:
+    """The program with camera and draws free, but for the step of a closed ring; None for straight rows."""
+    values = leaves(program)
+    step = values.get("draw.x.angle.j", 0.0)
+    if step == 0.0 or "draw.y.angle.j" not in values:
+        return None
+    sketch = whole_program_sketch(program)
+    if abs(round(360 / step) * step - 360) < _CLOSED_DEG:
+        free = tuple(hole for hole in sketch.holes if not hole.path.endswith(".angle.j"))
+        sketch = replace(sketch, holes=free)
+    return next(fillings(sketch, unknowns_of(sketch), most_indices=_MOST_OBJECTS, most_settings=1), None)
+
+
+def _mirror_image(fit: CurveFit, camera: Camera, size: Size) -> torch.Tensor | None:
+    """The numbers [F] of the program that draws the same places, about, from the mirrored pose."""
+    pattern = fit.filling.pattern
+    plane = pattern.points_at(fit.index, fit.theta).numpy()
+    seen = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm).numpy()
+    photo = _projected(seen, plane)
+    middle = photo.mean(0)
+    sight = np.array([*(middle - size.middle), camera.focal_px(size)])
+    sight /= np.linalg.norm(sight)
+    normal = np.array(camera.normal)
+    x, y, z = (2 * float(normal @ sight) * sight - normal).tolist()
+    mirrored = Camera.from_normal((x, y, z), focal_mm=fit.focal_mm)
+    if abs(mirrored.rx_deg) > 80 or abs(mirrored.ry_deg) > 80:
+        return None
+    turned = _similarity(plane, _projected(np.linalg.inv(mirrored.image_from_plane(size).numpy()), photo))
+    values = dict(zip((unknown.name for unknown in fit.filling.moving), fit.z.tolist(), strict=True))
+    values |= {"camera.rx": mirrored.rx_deg, "camera.ry": mirrored.ry_deg}
+    for variable in ("1", "i", "j"):
+        radius, x, y = (f"draw.{name}.{variable}" for name in ("x.radius", "x.offset", "y.offset"))
+        if radius in values:
+            values[radius] *= abs(turned.factor)
+        if x in values and y in values:
+            moved = turned.factor * complex(values[x], values[y]) + turned.shift * (variable == "1")
+            values |= {x: moved.real, y: moved.imag}
+    values["draw.x.angle.1"] += math.degrees(math.atan2(turned.factor.imag, turned.factor.real))
+    return torch.tensor([values[unknown.name] for unknown in fit.filling.moving], dtype=torch.float64)
+
+
+def _projected(matrix: Array, points: Array) -> Array:
+    """Points [N, 2] under a homography [3, 3]."""
+    at = np.concatenate([points, np.ones((len(points), 1))], 1) @ matrix.T
+    return at[:, :2] / at[:, 2:]
+
+
+def _similarity(points: Array, onto: Array) -> _Turned:
+    """The similarity that takes points [N, 2] onto others best, in least squares."""
+    a, b = points @ [1, 1j], onto @ [1, 1j]
+    centred = a - a.mean()
+    factor = complex(np.vdot(centred, b - b.mean()) / max(float(np.vdot(centred, centred).real), 1e-12))
+    return _Turned(factor, complex(b.mean() - factor * a.mean()))
