@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from p3i.errors import UsageError
+from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Header, Program
 from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
 from p3i.paint.options import RenderOptions
@@ -191,6 +191,26 @@ def examples(
         force=force,
         progress=progress,
     )
+
+
+def _photo_and_program(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None,
+    config: SearchConfig | None = None,
+    *,
+    progress: Progress | None = None,
+) -> "tuple[Image, Program]":
+    """Both in memory: read where they are files, the program found by `synth` where there is none.
+
+    Raises NoPatternError where none is found, FileError and ParseError for files that cannot be read.
+    """
+    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    if program is None:
+        result = synth(image, config, progress=progress)
+        if result.program is None:
+            raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
+        return image, result.program
+    return image, program if isinstance(program, Program) else load(Path(program))
 
 
 def _without(

@@ -1,0 +1,102 @@
+"""A program laid over its photo: the camera, the objects, and the steps from one to the next.
+
+Convention: arrays of float64; points of the plane in program units, points of the photo in pixels, pixel
+centres at whole numbers; matrices map program units to pixels, their third row is the depth (positive in front).
+A photo whose lens bends lines (header key lens_k1) is straightened first: `straight` is the one to look at.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from p3i.errors import ProgramError
+from p3i.grammar.ast import Affine, Program
+from p3i.interp.camera import Camera
+from p3i.interp.compile import compile
+from p3i.interp.pattern import Pattern
+from p3i.interp.unroll import distinct, nest, points
+from p3i.paint.lens import straight_photo
+from p3i.size import Size
+from p3i.vision.image import Image
+from p3i.vision.sheet import project
+
+# Objects farther out, in program units, come of overflows.
+_FAR = 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A program on a canvas of `size`, seen by `camera`.
+
+    `index` [M, 2] int64 and `points` [M, 2] are its objects in program order (coinciding draws are one);
+    `image_from_plane` is [3, 3]. Objects at or behind the camera are among them: `centers_px` tells.
+    """
+
+    pattern: Pattern
+    camera: Camera
+    size: Size
+    image_from_plane: np.ndarray
+    index: np.ndarray
+    points: np.ndarray
+
+    def centers_px(self) -> tuple[np.ndarray, np.ndarray]:
+        """The objects on the photo: pixels [M, 2], and which lie in front of the camera [M]."""
+        return project(self.image_from_plane, self.points)
+
+    def in_sight(self) -> np.ndarray:
+        """Which objects [M] lie on the photo."""
+        pixels, front = self.centers_px()
+        limits = np.array([self.size.width, self.size.height]) - 0.5
+        return front & (pixels >= -0.5).all(1) & (pixels <= limits).all(1)
+
+    def at(self, index: np.ndarray) -> np.ndarray:
+        """The plane points [K, 2] of any (i, j) [K, 2], drawn or not, fractions too."""
+        return self.pattern.points_at(torch.as_tensor(np.asarray(index, float))).numpy()
+
+    @property
+    def basis(self) -> np.ndarray | None:
+        """The lattice basis [2, 2], rows u (one step of i) and v (one step of j); None for what is no lattice.
+
+        A program whose objects form one row only is none either.
+        """
+        draw = nest(self.pattern.program).draw
+        if not (isinstance(draw.x, Affine) and isinstance(draw.y, Affine)):
+            return None
+        basis = np.array([[draw.x.i, draw.y.i], [draw.x.j, draw.y.j]], float)
+        lengths = np.linalg.norm(basis, axis=1)
+        return basis if abs(np.linalg.det(basis)) > 1e-6 * lengths.prod() + 1e-12 else None
+
+    @property
+    def origin(self) -> np.ndarray:
+        """The plane point [2] of (i, j) = (0, 0)."""
+        return self.at(np.zeros((1, 2)))[0]
+
+
+def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> Placed:
+    """`program` on the canvas of `photo`; the focal is `focal_mm`, else the header's, the photo's, 35 mm.
+
+    Raises ProgramError for a program without objects, or with none in front of the camera.
+    """
+    header_mm = program.header.focal_mm if program.header else None
+    known = next((mm for mm in (focal_mm, header_mm, photo.focal_mm) if mm is not None), None)
+    camera = Camera.of(program) if known is None else Camera.of(program, focal_mm=known)
+    found = [place for place in points(program) if abs(place[0]) < _FAR and abs(place[1]) < _FAR]
+    kept = [found[place] for place in distinct(found)]
+    result = Placed(
+        compile(program),
+        camera,
+        photo.size,
+        camera.image_from_plane(photo.size).numpy(),
+        np.array([place[2:] for place in kept], np.int64).reshape(-1, 2),
+        np.array([place[:2] for place in kept], float).reshape(-1, 2),
+    )
+    if not len(kept) or not result.centers_px()[1].any():
+        raise ProgramError("the program draws nothing in front of its camera: `p3i check` says where it does")
+    return result
+
+
+def straight(photo: Image, program: Program) -> Image:
+    """The photo as a pinhole camera would show it: itself, unless the program's header names a lens_k1."""
+    k1 = program.header.lens_k1 if program.header else None
+    return straight_photo(photo, k1) if k1 else photo
