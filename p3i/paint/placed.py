@@ -1,8 +1,8 @@
 """A program laid over its photo: the camera, the objects, and the steps from one to the next.
 
 Convention: arrays of float64; points of the plane in program units, points of the photo in pixels, pixel
-centres at whole numbers; matrices map program units to pixels, their third row is the depth (positive in front).
-A photo whose lens bends lines (header key lens_k1) is straightened first: `straight` is the one to look at.
+centres at whole numbers; matrices map program units to pixels, their third row is the depth (positive in
+front). A photo whose lens bends lines (header key lens_k1) is straightened first: see `straight`.
 """
 
 from dataclasses import dataclass
@@ -56,9 +56,9 @@ class Placed:
 
     @property
     def basis(self) -> np.ndarray | None:
-        """The lattice basis [2, 2], rows u (one step of i) and v (one step of j); None for what is no lattice.
+        """The lattice basis [2, 2], rows u (a step of i) and v (a step of j); None where there is none.
 
-        A program whose objects form one row only is none either.
+        Neither rings nor programs whose objects form one row are lattices.
         """
         draw = nest(self.pattern.program).draw
         if not (isinstance(draw.x, Affine) and isinstance(draw.y, Affine)):
