@@ -26,8 +26,9 @@ Array = NDArray[np.float64]
 
 # Poses that lie no further apart are one.
 _SAME_DEG = 5.0
-# The mirrored pose fits as well where the logarithm of the misfits' ratio, times the objects, is below this
-# (an F-test, as for the focal in rings.py), and the objects agree no less than this share of the answer's.
+# The objects tell the poses apart where the misfit is so much larger: by its logarithm, times the objects (an
+# F-test, as for the focal in rings.py), and as a logarithm of likelihoods under the noise that places have;
+# or where they agree less than this share of what they do under the answer.
 _TELLS = 6.0
 _AS_ALIKE = 0.9
 _LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
@@ -67,8 +68,8 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
     values = dict(zip((unknown.name for unknown in filling.moving), other.z.tolist(), strict=True))
     found = Camera(values["camera.rx"], values["camera.ry"], focal_mm)
     apart = math.degrees(math.acos(min(1.0, abs(float(np.dot(found.normal, camera.normal))))))
-    misfits = [min(fit.cost, _WORST_MISFIT) + _LEAST_MISFIT for fit in (own, other)]
-    told = len(own.contrast) * math.log(misfits[1] / misfits[0])
+    ours, theirs = (min(fit.cost, _WORST_MISFIT) + _LEAST_MISFIT for fit in (own, other))
+    told = len(own.contrast) * min(math.log(theirs / ours), 2 * (theirs - ours))
     if apart < _SAME_DEG or told > _TELLS or other.mean < _AS_ALIKE * own.mean:
         return None
     return found
