@@ -75,8 +75,8 @@ def by_explained(
 
     Every answer's `worth` becomes what it explains. Within a family the order stays, since that family knows
     its own programs best; what is no answer (a score below `needed`, or no bits) stands in no other's way. A
-    hybrid that holds a ring, drawing its objects and more, says all that the ring says: it is worth at least
-    as much, and what its further objects explain beyond its higher cost.
+    hybrid that holds a ring, drawing its objects and more, says all that the ring says, and is measured by it:
+    it is worth what the ring is, and what its further objects explain beyond its higher cost.
     """
     told = [[(answer, explained(evidence, answer)) for answer in family] for family in answers]
     rings = [by_itself for family in told for answer, by_itself in family if answer.structure == "circular"]
@@ -84,8 +84,9 @@ def by_explained(
     for family in told:
         most = math.inf
         for answer, by_itself in family:
-            held = rings if answer.structure == "hybrid" else ()
-            bits = max([by_itself.bits, *(_beyond(by_itself, ring) for ring in held)])
+            beyond = [_beyond(by_itself, ring) for ring in rings if answer.structure == "hybrid"]
+            bits = max(beyond, default=-math.inf)
+            bits = by_itself.bits if bits == -math.inf else bits
             together.append(replace(answer, worth=min(most, bits)))
             if answer.score >= needed and bits > 0:
                 most = min(most, bits)
