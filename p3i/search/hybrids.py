@@ -61,14 +61,14 @@ def find_hybrids(session: Session) -> list[Answer]:
 def _fits(session: Session, ring: CurveFit, proposals: list[HybridProposal]) -> list[CurveFit]:
     """The proposals that hold, fitted, with all the rings that they go on to."""
     found: list[CurveFit] = []
-    tried: list[HybridProposal] = []
+    kept: list[HybridProposal] = []
     for proposal in sorted(proposals, key=lambda proposal: -proposal.objects):
-        if any(_alike(proposal, other) for other in tried):
+        if any(_alike(proposal, other) for other in kept):
             continue
-        tried.append(proposal)
         fit = _fitted(session, ring, proposal)
         if fit is None or not _holds(fit, ring):
             continue
+        kept.append(proposal)
         fit = _grown(session, fit, proposal)
         session.record("hybrid", program=fit.filling.program(fit.z, ()), score=fit.quality)
         found.append(fit)

@@ -1,10 +1,12 @@
 """Hybrids, from the photo to the program: one scene of each kind, and no hybrid where there is one ring."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
+import torch
 from drawn import DrawnRing
 
 from p3i.evaluation.hybrid_scenes import hybrid_scene
@@ -14,9 +16,9 @@ from p3i.grammar.leaves import leaves
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
-from p3i.search.curves import curve_score, follow, measured
+from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.evidence import Evidence
-from p3i.search.hybrids import find_hybrids, hybrid_filling
+from p3i.search.hybrids import _evenly_sure, find_hybrids, hybrid_filling
 from p3i.search.propose.hybrid import HybridProposal
 from p3i.search.result import NEEDED
 from p3i.search.rings import FoundRing, numbers_of, ring_filling
@@ -54,17 +56,20 @@ def session_with_ring(
 
 
 @lru_cache
-def shown(kind: str) -> tuple[Scene, Answer]:
-    """The scene of a kind, and the answer from the second of its rings."""
-    scene = hybrid_scene(SCENES[kind], kind=kind)
+def shown(kind: str, seed: int | None = None, *, of: int = 1) -> tuple[Scene, Answer]:
+    """The scene of a kind, and the answer from one of its rings, by default the second."""
+    scene = hybrid_scene(SCENES[kind] if seed is None else seed, kind=kind)
     evidence = Evidence(scene.image(), SearchConfig(focal_mm=35.0), 35.0)
     values = leaves(scene.program)
-    ring = sorted(set(scene.index[:, 0].tolist()))[1]
+    ring = sorted(set(scene.index[:, 0].tolist()))[of]
     own = {name: values[name] + ring * values[f"{name[:-1]}i"] for name in MOVING} | {
         name: values[name] for name in ("camera.rx", "camera.ry", "draw.x.angle.1")
     }
     count = int((scene.index[:, 0] == ring).sum())
-    answers = find_hybrids(session_with_ring(evidence, own, count=count))
+    own |= {"draw.x.angle.j": values["draw.x.angle.j"]}
+    slots = round(360 / values["draw.x.angle.j"])
+    session = session_with_ring(evidence, own, count=count, drawn=None if count == slots else count)
+    answers = find_hybrids(session)
     assert answers, f"no hybrid in the scene of kind {kind}"
     return scene, answers[0]
 
@@ -86,6 +91,34 @@ def test_the_pose_of_a_hybrid_is_right_to_a_degree(kind: str) -> None:
     scene, answer = shown(kind)
     between = np.dot(Camera.of(answer.program).normal, scene.camera.normal)
     assert math.degrees(math.acos(min(1.0, between))) < 1
+
+
+def test_a_fan_is_found_from_its_inner_ring_though_the_outer_draws_lie_far_apart() -> None:
+    scene, answer = shown("fan", 13, of=0)
+    drawn, _, seen = on_canvas(answer.program, scene.size)
+    apart = np.linalg.norm(scene.centers_px[:, None] - drawn[seen], axis=2)
+    assert seen.sum() == len(scene.centers_px) == 18
+    assert apart.min(1).max() < 10
+
+
+def rings_with(*contrasts: list[float]) -> CurveFit:
+    """A fit of a row of rings of five whose objects in sight agree so well."""
+    filling = hybrid_filling(replace(PROPOSAL, first=0, last=2, count=5, counted_by_ring=False))
+    index = [(i, j) for i, ring in enumerate(contrasts) for j in range(len(ring))]
+    together = torch.tensor([one for ring in contrasts for one in ring])
+    return CurveFit(filling, torch.zeros(0), 35.0, 1.0, torch.tensor(index).double(), together)
+
+
+def test_a_ring_of_which_two_objects_are_in_sight_makes_no_hybrid() -> None:
+    sure = [0.9] * 5
+    assert _evenly_sure(rings_with(sure, [0.9] * 3, sure))
+    assert not _evenly_sure(rings_with(sure, [0.9] * 2, sure))
+
+
+def test_a_ring_that_has_two_objects_of_another_one_makes_no_hybrid() -> None:
+    sure = [0.9] * 5
+    assert not _evenly_sure(rings_with(sure, [0.9, 0.9, 0.0, 0.0, 0.0]))
+    assert _evenly_sure(rings_with(sure, [0.9, 0.9, 0.9, 0.0, 0.0]))
 
 
 def test_a_fan_is_written_with_a_count_that_grows_with_i() -> None:

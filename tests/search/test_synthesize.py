@@ -9,17 +9,22 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from drawn import DrawnRing
 from truth import PATTERN, SMALL, evidence_of, lattice_error, lattice_of, pose_error_deg, small_scene
 
 from p3i.evaluation.scenes import Scene
+from p3i.grammar.ast import Program
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
 from p3i.grammar.strict import departures
 from p3i.interp.camera import Camera
 from p3i.search import lattices
+from p3i.search import synthesize as synthesize_module
 from p3i.search.config import SearchConfig
 from p3i.search.grow import measure
 from p3i.search.result import NEEDED, StopReason, SynthesisResult
+from p3i.search.session import Answer
+from p3i.search.sketches import Family
 from p3i.search.synthesize import focal_of, synthesize
 from p3i.size import Size
 from p3i.vision.image import Image
@@ -175,6 +180,34 @@ def test_an_interrupt_while_a_runner_up_is_worked_out_keeps_the_answer(
     assert stop.left < 0, "the search should come that far"
     assert result.stop is StopReason.INTERRUPTED
     assert result.program is not None and pose_error_deg(result.program, scene.program) < 1
+
+
+def answered_by(monkeypatch: pytest.MonkeyPatch, program: str, *, structure: str = "circular") -> None:
+    """Let the only family answer with this program, and a score beyond doubt."""
+    found = parse(program)
+    assert isinstance(found, Program)
+    answer = Answer(found, structure, 0.9, 0.9)  # pyright: ignore[reportArgumentType]
+    monkeypatch.setattr(synthesize_module, "FAMILIES", (Family("circular", lambda _: [answer]),))
+
+
+def test_a_program_that_costs_more_than_it_explains_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    answered_by(monkeypatch, "for j in range(0, 9):\n    Draw(x=9*Cos(40*j), y=9*Sin(40*j))\n")
+    result = synthesize(photo(noise()), SearchConfig())
+    assert (result.program, result.stop) == (None, StopReason.COSTS_MORE)
+    assert result.reason == StopReason.COSTS_MORE.value
+
+
+@pytest.mark.parametrize(("radius", "told"), [(5, True), (24, False)])
+def test_a_ring_that_leaves_its_tilt_open_says_so(
+    monkeypatch: pytest.MonkeyPatch, radius: float, told: bool
+) -> None:
+    ring = DrawnRing(count=6, slots=6, center=(0, 0), radius=radius, size=0.6 * radius, rx_deg=-30, ry_deg=0)
+    x, y = f"{radius}*Cos(60*j + 20)", f"{radius}*Sin(60*j + 20)"
+    answered_by(monkeypatch, f"SetCameraPose(rx=-30, ry=0)\nfor j in range(0, 6):\n    Draw(x={x}, y={y})\n")
+    result = synthesize(ring.image(), SearchConfig())
+    assert result.program is not None
+    assert (result.mirrored is not None) == told
+    assert any("mirrored" in note for note in result.notes) == told
 
 
 def test_progress_tells_what_is_done_and_never_goes_back() -> None:
