@@ -146,13 +146,23 @@ def straighten(pixels: Floats, valid: Mask, image_from_cells: Array, *, box: Box
     """
     points = sheet_points(box, side)
     at, front = project(image_from_cells, points)
-    height, width = valid.shape
     spacing = cell_sides_px(image_from_cells, points)[0] / side
+    return sampled(pixels, valid, at, front, spacing, box=box, side=side)
+
+
+def sampled(
+    pixels: Floats, valid: Mask, at: Array, front: Mask, spacing: Array, *, box: Box, side: int
+) -> Sheet:
+    """`straighten` where the samples' places `at` [h, w, 2] in the photo (pixels) are known already.
+
+    `front` [h, w] says which have a place at all, `spacing` [h, w] how many pixels apart they lie.
+    """
+    height, width = valid.shape
     inside = (
         front & (at[..., 0] >= 0) & (at[..., 0] <= width - 1) & (at[..., 1] >= 0) & (at[..., 1] <= height - 1)
     )
     level = np.clip(np.round(np.log2(np.maximum(spacing, 1e-6)) + 0.2), 0, 5).astype(int)
-    at = np.where(inside[..., None], at, 0).astype(np.float32)
+    places = np.where(inside[..., None], at, 0).astype(np.float32)
     values = np.zeros((*inside.shape, 3), np.float32)
     weight = valid.astype(np.float32)
     colour = np.ascontiguousarray(pixels * weight[..., None], dtype=np.float32)
@@ -163,7 +173,7 @@ def straighten(pixels: Floats, valid: Mask, image_from_cells: Array, *, box: Box
         here = inside & (level == k)
         if not here.any():
             continue
-        x, y = at[..., 0][here] / 2**k, at[..., 1][here] / 2**k
+        x, y = places[..., 0][here] / 2**k, places[..., 1][here] / 2**k
         taken, known = _take(colour, x, y), _take(weight, x, y)
         values[here] = taken / np.maximum(known, 1e-3)[:, None]
         seen[here] = known > 0.6
