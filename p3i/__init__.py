@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from p3i.api import eval_set, examples, read_image, render, score, synth, trace
+    from p3i.api import eval_set, examples, points, read_image, rectify, render, score, synth, trace
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, loads
     from p3i.paint.options import RenderOptions
+    from p3i.paint.points_options import PointsOptions
+    from p3i.paint.rectify_options import RectifyOptions
     from p3i.search.config import SearchConfig
     from p3i.search.result import StopReason, SynthesisResult
 
@@ -28,8 +30,10 @@ _HOMES = {
     "FileError": "p3i.errors",
     "NoPatternError": "p3i.errors",
     "P3IError": "p3i.errors",
+    "PointsOptions": "p3i.paint.points_options",
     "Program": "p3i.grammar.ast",
     "ProgramError": "p3i.errors",
+    "RectifyOptions": "p3i.paint.rectify_options",
     "RenderOptions": "p3i.paint.options",
     "SearchConfig": "p3i.search.config",
     "StopReason": "p3i.search.result",
@@ -44,7 +48,9 @@ _HOMES = {
     "format": "p3i.language",
     "load": "p3i.language",
     "loads": "p3i.language",
+    "points": "p3i.api",
     "read_image": "p3i.api",
+    "rectify": "p3i.api",
     "render": "p3i.api",
     "score": "p3i.api",
     "synth": "p3i.api",
@@ -52,9 +58,10 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand", "examples", "trace", "eval_set",
+    "synth", "render", "rectify", "points", "score", "check", "format", "expand", "examples", "trace", "eval_set",
     "load", "loads", "dump", "dumps", "read_image",
-    "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions",
+    "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions", "PointsOptions",
+    "RectifyOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
 

@@ -14,6 +14,8 @@ from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Header, Program
 from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
 from p3i.paint.options import RenderOptions
+from p3i.paint.points_options import PointsOptions
+from p3i.paint.rectify_options import RectifyOptions
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
 
@@ -23,12 +25,14 @@ if TYPE_CHECKING:
     from p3i.evaluation.score_set import SetScore
     from p3i.paint.draw import RenderedPicture
     from p3i.paint.film import Film
+    from p3i.paint.objects import Objects
+    from p3i.paint.rectify import Rectified
     from p3i.search.score import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "score", "check", "format", "expand", "examples", "trace", "eval_set",
+    "synth", "render", "rectify", "points", "score", "check", "format", "expand", "examples", "trace", "eval_set",
     "load", "loads", "dump", "dumps", "read_image",
 ]  # fmt: skip
 
@@ -133,6 +137,63 @@ def render(
     from p3i.paint.draw import render as draw
 
     return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
+
+
+def points(
+    program: "Program | str | os.PathLike[str] | Image",
+    options: PointsOptions | None = None,
+    *,
+    image: "str | os.PathLike[str] | Image | None" = None,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Objects":
+    """The objects of `program` with their places, names, cells and, on the photo `image`, their presence.
+
+    `program` may be a photo, in memory or as a file: then its program is found first, by `config`. `changes`
+    are fields of PointsOptions. The result has `objects`, `columns`, `rows`, `counts`, `differs_from(size)`
+    and `encode(format)`. Raises FileError, ParseError, UsageError, ProgramError for a program that draws
+    nothing in front of its camera, and NoPatternError for a photo without a pattern.
+    """
+    from p3i.paint.objects import objects_of
+    from p3i.paint.source import is_photo, read_program
+    from p3i.vision.image import Image
+
+    given: Program | None = program if isinstance(program, Program) else None
+    if isinstance(program, Image) or (isinstance(program, str | os.PathLike) and is_photo(program)):
+        if image is not None:
+            raise UsageError("both are photos: name a program and its photo, or the photo alone")
+        image = program
+    elif given is None:
+        assert isinstance(program, str | os.PathLike)
+        given = read_program(program)
+    name = Path(image).name if isinstance(image, str | os.PathLike) and os.fspath(image) != "-" else None
+    if image is None:
+        assert given is not None
+        return objects_of(given, None, options, **changes)
+    photo, found = _photo_and_program(image, given, config, progress=progress)
+    return objects_of(found, photo, options, image=name, **changes)
+
+
+def rectify(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None = None,
+    options: RectifyOptions | None = None,
+    *,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Rectified":
+    """The plane of `photo` as seen straight on, by `program`, or by the one that `synth` finds by `config`.
+
+    `changes` are fields of RectifyOptions. The result has `paint()`, `save(path)`, `back(edited)`, `record()`
+    and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program without objects on the
+    photo, and NoPatternError for a photo without a pattern.
+    """
+    from p3i.paint.rectify import rectify as straighten
+
+    image, found = _photo_and_program(photo, program, config, progress=progress)
+    return straighten(image, found, options, **changes)
 
 
 def eval_set(

@@ -130,6 +130,28 @@ def sides(chart: Chart, index: np.ndarray) -> np.ndarray:
     return found[(np.abs(found) < _FAR).all(axis=(1, 2))]
 
 
+def polygons(chart: Chart, index: np.ndarray) -> np.ndarray:
+    """The cell around each object `index` [M, 2], corner by corner: [M, K, 2], all with as many corners.
+
+    A cell that folds over (the middle of rings) is a disc that reaches half way to the nearest objects.
+    """
+    cuts = np.linspace(-0.5, 0.5, _parts(chart) + 1)[:-1]
+    ends = np.full(len(cuts), 0.5)
+    # Once round the square of the cell's two coordinates.
+    around = np.concatenate(
+        [np.stack(pair, axis=1) for pair in ((cuts, -ends), (ends, cuts), (-cuts, ends), (-ends, -cuts))]
+    )
+    place = np.repeat(_places(index)[:, None], len(around), axis=1)
+    place[:, :, chart.axes] += around
+    corners = chart.at(place.reshape(-1, 4)).reshape(len(index), len(around), 2)
+    if chart.axes == (0, 1) and len(index):
+        folded = ~_orientations(chart.pattern, index)[0]
+        turn = 2 * np.pi * (np.arange(len(around)) / len(around) + 0.125)
+        disc = pitch(chart) / 2 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        corners[folded] = _points(chart.pattern, index[folded].astype(float))[:, None] + disc
+    return corners
+
+
 def _places(index: np.ndarray) -> np.ndarray:
     return np.concatenate([index.astype(np.float64), np.zeros((len(index), 2))], axis=1)
 

@@ -33,6 +33,23 @@ def read_program(path: str | PathLike[str]) -> Program:
     raise ParseError(parsed, source=source_text(source), path=name)
 
 
+def is_photo(path: str | PathLike[str]) -> bool:
+    """Whether a file is a picture, and none that carries a program; standard input is taken for a program.
+
+    Files that cannot be read are no photos: their reader says why.
+    """
+    if fspath(path) == "-" or Path(path).suffix.lower() == ".p3p" or not Path(path).is_file():
+        return False
+    try:
+        data = _bytes_of(Path(path))
+    except FileError:
+        return False
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return _text_of_png(data) is None
+    # Programs and SVG are text: no NUL, and no Netpbm's magic number.
+    return b"\0" in data[:4096] or data.startswith((b"P1", b"P2", b"P3", b"P4", b"P5", b"P6"))
+
+
 def program_text_in(data: bytes, *, name: str) -> str | None:
     """The text that a drawn PNG or SVG carries; None for bytes of any other kind.
 

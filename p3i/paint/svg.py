@@ -19,7 +19,7 @@ def svg(scene: Scene, *, program_text: str) -> str:
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
         f'viewBox="-0.5 -0.5 {width} {height}">',
-        f'<metadata><program xmlns="urn:p3i">{escape(_writable(program_text))}</program></metadata>',
+        program_element(program_text),
     ]
     if scene.paper is not None:
         lines.append(
@@ -37,6 +37,11 @@ def svg(scene: Scene, *, program_text: str) -> str:
             case Dots():
                 lines += _dots(layer)
     return "\n".join([*lines, "</svg>", ""])
+
+
+def program_element(text: str) -> str:
+    """The metadata that holds a program's text, where `read_program` finds it."""
+    return f'<metadata><program xmlns="urn:p3i">{escape(_writable(text))}</program></metadata>'
 
 
 def number(value: float) -> str:
