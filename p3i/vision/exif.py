@@ -15,6 +15,7 @@ FOCAL_LENGTH_35MM = 0xA405
 PIXEL_WIDTH = 0xA002
 PIXEL_HEIGHT = 0xA003
 ORIENTATION = 0x0112
+X_RESOLUTION, Y_RESOLUTION, RESOLUTION_UNIT = 0x011A, 0x011B, 0x0128
 EXIF_BLOCK = 0x8769
 
 # Of a TIFF: sizes, depths, strips and tiles, compression, extra samples, tables, profile. They describe the
@@ -102,13 +103,19 @@ def focal_from_exif(exif: Pil.Exif, size: Size) -> ExifFocal:
     return _sound(length_mm / sensor_mm * 36)
 
 
-def upright_exif(exif: bytes) -> bytes:
-    """The EXIF block of a picture that is written upright: orientation 1, and nothing of its storage."""
+def upright_exif(exif: bytes, *, dpi: float | None = None) -> bytes:
+    """The EXIF block of a picture that is written upright: orientation 1, and nothing of its storage.
+
+    `dpi` replaces the resolution that it speaks of.
+    """
     block = Pil.Exif()
     block.load(exif)
     for tag in _STORAGE_TAGS & set(block):
         del block[tag]
     block[ORIENTATION] = 1
+    if dpi is not None:
+        block[X_RESOLUTION] = block[Y_RESOLUTION] = dpi
+        block[RESOLUTION_UNIT] = 2  # inches
     return block.tobytes()
 
 

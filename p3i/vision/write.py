@@ -44,20 +44,22 @@ def write_image(
     exif: bytes | None = None,
     text: Mapping[str, str] | None = None,
     kind: str | None = None,
+    dpi: float | None = None,
 ) -> None:
     """Write a picture to a file, or to standard output for `-`.
 
-    `pixels` is [H, W, 3] RGB, float in 0..1 (clipped, rounded) or uint8; `alpha` float [H, W] in 0..1.
+    `pixels` is [H, W, 3] RGB, float in 0..1 (clipped, rounded), uint8 or uint16; `alpha` [H, W] likewise.
     The format follows the suffix of `path`, or `kind` (".png"), which `-` needs. `bits` 16 is kept by PNG
     and TIFF, other formats hold 8. `icc` and `exif` are raw blocks as `Source` holds them; the orientation
-    is set to upright. `text` goes into a PNG as iTXt, keyword by keyword.
+    is set to upright. `text` goes into a PNG as iTXt, keyword by keyword. `dpi` is the resolution, which
+    WebP holds in its EXIF block only, if at all.
 
     The file appears whole or not at all: written beside its place, then renamed. Raises UsageError for a
     format that is not known or cannot hold what is asked, FileError where the file exists (without `force`)
     or cannot be written.
     """
     data = encode(
-        pixels, kind=kind or Path(path).suffix, alpha=alpha, bits=bits, icc=icc, exif=exif, text=text
+        pixels, kind=kind or Path(path).suffix, alpha=alpha, bits=bits, icc=icc, exif=exif, text=text, dpi=dpi
     )
     write_bytes(path, data, force=force)
 
@@ -125,6 +127,7 @@ def encode(
     icc: bytes | None = None,
     exif: bytes | None = None,
     text: Mapping[str, str] | None = None,
+    dpi: float | None = None,
 ) -> bytes:
     """The bytes of a picture file of `kind` (a suffix such as ".png"); the rest as in `write_image`."""
     name = _FORMATS.get(kind.lower())
@@ -142,11 +145,11 @@ def encode(
     array = _quantized(pixels, bits)
     if alpha is not None:
         array = np.concatenate([array, _quantized(alpha[:, :, None], bits)], axis=2)
-    exif = upright_exif(exif) if exif else None
+    exif = upright_exif(exif, dpi=dpi) if exif else None
     if name == "PNG":
-        return _png(array, icc=icc, exif=exif, text=text or {})
+        return _png(array, icc=icc, exif=exif, text=text or {}, dpi=dpi)
     if bits == 16:
-        return _tiff_16(array, icc=icc)
+        return _tiff_16(array, icc=icc, dpi=dpi)
     picture = Pil.fromarray(array)
     options: dict[str, object] = {"quality": _JPEG_QUALITY} if name in ("JPEG", "WEBP") else {}
     if name == "TIFF":
@@ -155,6 +158,8 @@ def encode(
         options["icc_profile"] = icc
     if exif and name != "BMP":
         options["exif"] = exif
+    if dpi and name in ("JPEG", "TIFF", "BMP"):
+        options["dpi"] = (dpi, dpi)
     buffer = io.BytesIO()
     picture.save(buffer, name, **options)
     return buffer.getvalue()
@@ -180,10 +185,15 @@ def read_png_text(data: bytes) -> dict[str, str]:
     return found
 
 
-def _png(array: np.ndarray, *, icc: bytes | None, exif: bytes | None, text: Mapping[str, str]) -> bytes:
+def _png(
+    array: np.ndarray, *, icc: bytes | None, exif: bytes | None, text: Mapping[str, str], dpi: float | None
+) -> bytes:
     """A PNG of uint8 or uint16 [H, W, 3 or 4]; OpenCV packs the pixels, the other blocks are put in here."""
     data = _opencv_bytes(".png", array)
     chunks = b""
+    if dpi:
+        per_metre = round(dpi / 0.0254)
+        chunks += _chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
     if icc:
         chunks += _chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(icc))
     if exif:
@@ -198,11 +208,11 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
-def _tiff_16(array: np.ndarray, *, icc: bytes | None) -> bytes:
+def _tiff_16(array: np.ndarray, *, icc: bytes | None, dpi: float | None) -> bytes:
     """A plain one-strip TIFF of uint16 [H, W, 3 or 4]: Pillow and OpenCV write none with a profile."""
     height, width, channels = array.shape
     strip = np.ascontiguousarray(array.astype("<u2")).tobytes()
-    short, long, undefined = 3, 4, 7
+    short, long, rational, undefined = 3, 4, 5, 7
     tags: list[tuple[int, int, int, bytes]] = [
         (256, long, 1, struct.pack("<I", width)),
         (257, long, 1, struct.pack("<I", height)),
@@ -214,6 +224,10 @@ def _tiff_16(array: np.ndarray, *, icc: bytes | None) -> bytes:
         (278, long, 1, struct.pack("<I", height)),
         (279, long, 1, struct.pack("<I", len(strip))),
     ]
+    if dpi:
+        per_inch = struct.pack("<II", round(dpi * 1000), 1000)
+        tags += [(282, rational, 1, per_inch), (283, rational, 1, per_inch)]
+        tags.append((296, short, 1, struct.pack("<H", 2)))  # inches
     if channels == 4:
         tags.append((338, short, 1, struct.pack("<H", 2)))  # the fourth channel is plain alpha
     if icc:
@@ -241,9 +255,11 @@ def _opencv_bytes(suffix: str, array: np.ndarray) -> bytes:
 
 
 def _quantized(values: np.ndarray, bits: int) -> np.ndarray:
-    """Float in 0..1, or uint8, -> unsigned integers of `bits`."""
+    """Float in 0..1, uint8 or uint16 -> unsigned integers of `bits`."""
     if values.dtype == np.uint8:
         return values if bits == 8 else values.astype(np.uint16) * 257
+    if values.dtype == np.uint16:
+        return values if bits == 16 else ((values.astype(np.uint32) + 128) // 257).astype(np.uint8)
     top = 2**bits - 1
     rounded = np.rint(np.clip(np.nan_to_num(values), 0, 1) * top)
     return rounded.astype(np.uint8 if bits == 8 else np.uint16)

@@ -1,0 +1,101 @@
+"""`p3i rectify`: a photo in, its plane straightened out, and back again."""
+
+import dataclasses
+from typing import Any
+
+import click
+
+from p3i import api
+from p3i.cli import options, progress
+from p3i.cli.pictures import Outputs, json_option, kind_option
+from p3i.errors import UsageError
+from p3i.paint.rectify_options import CROPS, RectifyOptions, default, parse_cell, sentence
+
+
+def _sentence(name: str) -> str:
+    return sentence(RectifyOptions, name)
+
+
+@click.command("rectify", short_help="Straighten a photo by its program.")
+@click.argument("photo", metavar="PHOTO", type=click.Path())
+@click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
+@options.output("Where to write the picture, the kind by the suffix; - is stdout.")
+@kind_option
+@json_option
+@options.force
+@click.option(
+    "--crop",
+    type=click.Choice(CROPS),
+    default=default(RectifyOptions, "crop"),
+    show_default=True,
+    help=_sentence("crop"),
+)
+@click.option("--scale", type=float, metavar="S", help=_sentence("scale"))
+@click.option(
+    "--max-px",
+    type=int,
+    metavar="N",
+    default=default(RectifyOptions, "max_px"),
+    show_default=True,
+    help=_sentence("max_px"),
+)
+@click.option("--cell", metavar="WxHmm", help=_sentence("cell"))
+@click.option(
+    "--upright/--as-seen",
+    default=default(RectifyOptions, "upright"),
+    show_default=True,
+    help=_sentence("upright"),
+)
+@click.option("--focal", "focal_mm", type=float, metavar="MM", help=_sentence("focal_mm"))
+@click.option(
+    "--back",
+    metavar="EDITED",
+    type=click.Path(),
+    help="Write the photo instead, with what was edited in this picture of the same view.",
+)
+@click.option("--tolerance", type=float, metavar="T", help=_sentence("tolerance"))
+@options.quiet
+@options.verbose
+@options.error_format
+def command(**given: Any) -> None:
+    """Show the plane of PHOTO as seen straight on, by the program PROG; without one it is searched for.
+
+    With --back an edited view goes back into the photo: use the options that the view was made with. What was
+    not edited stays as it is, to the bit.
+    """
+    names = {field.name for field in dataclasses.fields(RectifyOptions)}
+    chosen = {name: value for name, value in given.items() if name in names}
+    chosen["cell"] = None if given["cell"] is None else parse_cell(given["cell"])
+    asked = RectifyOptions(**chosen)
+    if asked.tolerance is not None and given["back"] is None:
+        raise UsageError("--tolerance belongs to --back")
+    photo, program, edited = given["photo"], given["program"], given["back"]
+    if [photo, program, edited].count("-") > 1:
+        raise UsageError("only one input can be standard input")
+    outputs = Outputs.of(given, inputs=(photo, program, edited))
+    with progress.bar(photo, wanted=not given["quiet"]) as update:
+        found = api.rectify(photo, program, asked, progress=update)
+    outputs.say(found.notes, name=photo)
+    picture = None
+    if outputs.picture is not None and edited is not None:
+        returned = found.back(api.read_image(edited))
+        picture = returned.picture
+        outputs.say(_remarks(returned.changed, outputs.kind), name=photo)
+    elif outputs.picture is not None:
+        picture = found.paint()
+    outputs.write(picture, found.record(), name=photo)
+    if given["verbose"]:
+        camera, size = found.view.placed.camera, found.size
+        facts = f"{size.width} x {size.height} px, rx {camera.rx_deg:.4g}, ry {camera.ry_deg:.4g}, focal "
+        outputs.say([f"{facts}{camera.focal_mm:.4g} mm"], name=photo, kind="info")
+
+
+def _remarks(changed: int, kind: str) -> list[str]:
+    if not changed:
+        return ["the edited picture does not differ from the view: the photo is unchanged"]
+    found = [f"{changed:,} pixels of the photo changed"]
+    if kind in ("jpg", "webp"):
+        found.append(
+            f"{kind.upper()} stores every pixel anew: write PNG or TIFF to keep the others to the bit"
+        )
+    return found

@@ -1,0 +1,111 @@
+"""The one record of options that straightening takes: the Python API and the command line both read it.
+
+Imports neither torch nor numpy: `p3i rectify --help` reads this file.
+"""
+
+import dataclasses
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, get_type_hints
+
+from p3i.errors import UsageError
+
+CROPS = ("pattern", "inside", "all", "same")
+"""What of the plane a straightened view shows."""
+
+PICTURE_KINDS = ("png", "jpg", "tiff", "webp")
+"""The pictures that `rectify` and `tile` write."""
+
+_TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+
+
+@dataclass(frozen=True, slots=True)
+class CellSize:
+    """The true width and height of one cell, in millimetres."""
+
+    width_mm: float
+    height_mm: float
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(side) and 1e-6 < side < 1e9 for side in (self.width_mm, self.height_mm)):
+            raise UsageError(f"a cell has two sides above 0, not {self.width_mm:g} x {self.height_mm:g} mm")
+
+
+def parse_cell(text: str) -> CellSize:
+    """`600x600mm`, `60x30cm`, `1x1m`, `4x4in`, `2x1ft`; the unit may be left out for mm.
+
+    Raises UsageError for anything else.
+    """
+    number = r"(\d+(?:\.\d*)?|\.\d+)"
+    found = re.fullmatch(rf"\s*{number}\s*[xX×*]\s*{number}\s*([a-z]*)\s*", text)  # noqa: RUF001
+    if found is None or (found[3] or "mm") not in _TO_MM:
+        raise UsageError(
+            f"--cell {text}: write one cell's width and height, as in 600x600mm (mm, cm, m, in, ft)"
+        )
+    factor = _TO_MM[found[3] or "mm"]
+    return CellSize(float(found[1]) * factor, float(found[2]) * factor)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RectifyOptions:
+    """What of the plane to show, how large, and which way up. Raises UsageError for a value out of range."""
+
+    crop: Annotated[
+        str,
+        "What to show: the pattern with a cell's margin, the largest rectangle inside which all is known, all "
+        "of the photo that is not too near to the horizon, or the photo's own canvas and place.",
+    ] = "pattern"
+    scale: Annotated[
+        float | None,
+        "Pixels of the view per pixel of the photo, where the photo is sharpest at the pattern's middle. "
+        "[default: 1, or less where --max-px asks for it]",
+    ] = None
+    max_px: Annotated[int, "Make no view of more than N pixels (width times height)."] = 100_000_000
+    cell: Annotated[
+        CellSize | None,
+        "The true size of one cell of a lattice, such as 600x600mm: sets the proportions, whatever the focal, and "
+        "the resolution (dpi) of the file.",
+    ] = None
+    upright: Annotated[
+        bool, "Turn the view so that the lattice's rows run across, or leave it as the camera saw it."
+    ] = True
+    tolerance: Annotated[
+        float | None,
+        "With --back: how much a pixel (0 to 255) must differ to count as edited. [default: 0; 16 where the "
+        "edited file is a JPEG or WebP, whose every pixel differs]",
+    ] = None
+    focal_mm: Annotated[
+        float | None,
+        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.crop not in CROPS:
+            raise UsageError(f"a crop is one of {', '.join(CROPS)}, not {self.crop!r}")
+        if self.scale is not None and not (math.isfinite(self.scale) and 0 < self.scale <= 100):
+            raise UsageError(f"a scale lies above 0 and up to 100, not {self.scale:g}")
+        if self.max_px < 1:
+            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+        if self.tolerance is not None and not 0 <= self.tolerance < 255:
+            raise UsageError(f"a tolerance lies from 0 to below 255, not {self.tolerance:g}")
+        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+
+
+def sentence(record: type, name: str) -> str:
+    """The sentence that documents the field `name` of a record of options; KeyError where there is none."""
+    return get_type_hints(record, include_extras=True)[name].__metadata__[0]
+
+
+def default(record: type, name: str) -> Any:
+    """The default of the field `name` of a record of options; KeyError where there is none."""
+    return {field.name: field.default for field in dataclasses.fields(record)}[name]
+
+
+def changed(options: Any, changes: dict[str, Any], *, verb: str) -> Any:
+    """`options` with the fields of `changes`; raises UsageError for a field that it does not have."""
+    known = {field.name for field in dataclasses.fields(options)}
+    if unknown := sorted(changes.keys() - known):
+        raise UsageError(f"{verb} has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
+    return dataclasses.replace(options, **changes) if changes else options
