@@ -7,6 +7,7 @@ plane (propose/hybrid.py). Then all numbers are fitted together, as with a singl
 from dataclasses import replace
 
 import numpy as np
+import torch
 
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, filling_of
@@ -24,6 +25,10 @@ _KEPT_QUALITY = 0.6
 # sight: through two points there are circles anywhere.
 _LEAST_RING = 0.25
 _FEWEST_SEEN = 3
+# Draws of two rings closer than this share of a patch are one object; so large a part may be drawn twice,
+# where rings cross.
+_SAME_OBJECT = 0.4
+_MOST_TWICE = 0.25
 # A ring that goes round this far is taken for a whole one.
 _CLOSED_DEG = 300.0
 _MOST_GROWTHS = 4
@@ -176,7 +181,15 @@ def _holds(fit: CurveFit, ring: CurveFit) -> bool:
     """Whether a fit says more than the ring alone: more objects, nearly as sure, on each of its rings."""
     if len(fit.contrast) <= len(ring.contrast) + 1 or fit.quality < _KEPT_QUALITY * ring.quality:
         return False
-    return _evenly_sure(fit)
+    return _drawn_once(fit) and _evenly_sure(fit)
+
+
+def _drawn_once(fit: CurveFit) -> bool:
+    """Whether rings have objects of their own; laid over itself a step further, one finds its own again."""
+    at = fit.filling.pattern.points_at(fit.index, fit.theta)
+    other_ring = fit.index[:, None, 0] != fit.index[None, :, 0]
+    twice = (other_ring & (torch.cdist(at, at) < _SAME_OBJECT * fit.side)).any(1)
+    return float(twice.double().mean()) < _MOST_TWICE
 
 
 def _evenly_sure(fit: CurveFit) -> bool:

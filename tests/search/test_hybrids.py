@@ -18,7 +18,7 @@ from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.evidence import Evidence
-from p3i.search.hybrids import _evenly_sure, find_hybrids, hybrid_filling
+from p3i.search.hybrids import _drawn_once, _evenly_sure, find_hybrids, hybrid_filling
 from p3i.search.propose.hybrid import HybridProposal
 from p3i.search.result import NEEDED
 from p3i.search.rings import FoundRing, numbers_of, ring_filling
@@ -119,6 +119,18 @@ def test_a_ring_that_has_two_objects_of_another_one_makes_no_hybrid() -> None:
     sure = [0.9] * 5
     assert not _evenly_sure(rings_with(sure, [0.9, 0.9, 0.0, 0.0, 0.0]))
     assert _evenly_sure(rings_with(sure, [0.9, 0.9, 0.9, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(("step", "once"), [(24.0, False), (40.0, True), (48.0, True)])
+def test_a_ring_laid_over_its_own_objects_makes_no_hybrid(step: float, once: bool) -> None:
+    """Six on a circle of 24: a step of one radius takes two thirds of them onto others."""
+    filling = hybrid_filling(
+        replace(PROPOSAL, first=0, last=1, count=6, counted_by_ring=False, growth=0.0, along=(step, 0.0))
+    )
+    values = dict.fromkeys((unknown.name for unknown in filling.moving), 0.0)
+    z = numbers_of(filling, values | {"draw.x.radius.1": 24.0, "draw.x.offset.i": step})
+    index = filling.pattern.index.double()
+    assert _drawn_once(CurveFit(filling, z, 35.0, 24.0, index, torch.ones(len(index)))) == once
 
 
 def test_a_fan_is_written_with_a_count_that_grows_with_i() -> None:
