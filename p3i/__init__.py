@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from p3i.api import eval_set, examples, points, read_image, rectify, render, score, synth, trace
+    from p3i.api import eval_set, examples, points, read_image, rectify, render, score, show, synth, tile, trace
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from p3i.paint.options import RenderOptions
     from p3i.paint.points_options import PointsOptions
     from p3i.paint.rectify_options import RectifyOptions
+    from p3i.paint.tile_options import TileOptions
+    from p3i.paint.show_options import ShowOptions
     from p3i.search.config import SearchConfig
     from p3i.search.result import StopReason, SynthesisResult
 
@@ -38,6 +40,7 @@ _HOMES = {
     "SearchConfig": "p3i.search.config",
     "StopReason": "p3i.search.result",
     "SynthesisResult": "p3i.search.result",
+    "TileOptions": "p3i.paint.tile_options",
     "UsageError": "p3i.errors",
     "check": "p3i.language",
     "dump": "p3i.language",
@@ -53,15 +56,18 @@ _HOMES = {
     "rectify": "p3i.api",
     "render": "p3i.api",
     "score": "p3i.api",
+    "ShowOptions": "p3i.paint.show_options",
+    "show": "p3i.api",
     "synth": "p3i.api",
+    "tile": "p3i.api",
     "trace": "p3i.api",
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "rectify", "points", "score", "check", "format", "expand", "examples", "trace", "eval_set",
-    "load", "loads", "dump", "dumps", "read_image",
+    "synth", "show", "render", "rectify", "tile", "points", "score", "check", "format", "expand", "examples", "trace",
+    "eval_set", "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions", "PointsOptions",
-    "RectifyOptions",
+    "ShowOptions", "RectifyOptions", "TileOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
 

@@ -16,6 +16,8 @@ from p3i.language import check, dump, dumps, expand, format, load, load_sketch, 
 from p3i.paint.options import RenderOptions
 from p3i.paint.points_options import PointsOptions
 from p3i.paint.rectify_options import RectifyOptions
+from p3i.paint.tile_options import TileOptions
+from p3i.paint.show_options import ShowOptions
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
 
@@ -27,13 +29,14 @@ if TYPE_CHECKING:
     from p3i.paint.film import Film
     from p3i.paint.objects import Objects
     from p3i.paint.rectify import Rectified
+    from p3i.paint.tile import Tile
     from p3i.search.score import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "render", "rectify", "points", "score", "check", "format", "expand", "examples", "trace", "eval_set",
-    "load", "loads", "dump", "dumps", "read_image",
+    "synth", "show", "render", "rectify", "tile", "points", "score", "check", "format", "expand", "examples", "trace",
+    "eval_set", "load", "loads", "dump", "dumps", "read_image",
 ]  # fmt: skip
 
 Polygon = tuple[tuple[float, float], ...]
@@ -139,6 +142,28 @@ def render(
     return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
 
 
+def show(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None = None,
+    options: ShowOptions | None = None,
+    *,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "RenderedPicture":
+    """The overlay to look at first: `program` over `photo`, with objects, cells, names, horizon and extent.
+
+    Without a program it is found first, by `config`. `changes` are fields of ShowOptions. The result has
+    `pixels()`, `encode(kind)` and `save(path)`. Raises as `points`.
+    """
+    from p3i.paint.show import show as draw
+    from p3i.paint.source import read_program
+
+    given = read_program(program) if isinstance(program, str | os.PathLike) else program
+    image, found = _photo_and_program(photo, given, config, progress=progress)
+    return draw(image, found, options, **changes)
+
+
 def points(
     program: "Program | str | os.PathLike[str] | Image",
     options: PointsOptions | None = None,
@@ -194,6 +219,27 @@ def rectify(
 
     image, found = _photo_and_program(photo, program, config, progress=progress)
     return straighten(image, found, options, **changes)
+
+
+def tile(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None = None,
+    options: TileOptions | None = None,
+    *,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Tile":
+    """A seamless texture of the pattern on `photo`, by `program`, or by the one that `synth` finds by `config`.
+
+    `changes` are fields of TileOptions. The result has `pixels`, `paint()`, `save(path)`, `record()`, `seam` and
+    `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program that is neither a lattice nor
+    rings or has no object on the photo, and NoPatternError for a photo without a pattern.
+    """
+    from p3i.paint.tile import tile as make
+
+    image, found = _photo_and_program(photo, program, config, progress=progress)
+    return make(image, found, options, **changes)
 
 
 def eval_set(

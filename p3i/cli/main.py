@@ -27,8 +27,10 @@ class Entry(NamedTuple):
 
 COMMANDS: dict[str, Entry] = {
     "synth": Entry("p3i.cli.synth", "Find the camera and the program of a photo's pattern."),
+    "show": Entry("p3i.cli.show", "Draw a program over its photo, to see whether it is right."),
     "render": Entry("p3i.cli.render", "Draw a program as PNG, SVG or PDF, also over its photo."),
     "rectify": Entry("p3i.cli.rectify", "Straighten a photo by its program."),
+    "tile": Entry("p3i.cli.tile", "Make a seamless texture of a photo\'s pattern."),
     "points": Entry("p3i.cli.points", "List the objects: places, names, cells, and whether each is there."),
     "check": Entry("p3i.cli.check", "Report what is wrong, or odd, in programs."),
     "fmt": Entry("p3i.cli.fmt", "Rewrite programs in their canonical text."),

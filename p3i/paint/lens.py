@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from p3i.interp.lens import photo_from_straight, straight_from_photo
-from p3i.paint.scene import Dots, Layer, Pixels, Strokes
+from p3i.paint.scene import Dots, Labels, Layer, Pixels, Strokes
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.warp import pixel_grid, remapped
@@ -33,6 +33,15 @@ def bent(layer: Layer, size: Size, k1: float) -> Layer:
                 angles_deg=layer.angles_deg[shown],
                 colours=layer.colours[shown],
                 rims=layer.rims[shown],
+            )
+        case Labels(texts=texts):
+            anchors, shown = bent_points(layer.anchors, size, k1)
+            kept = np.flatnonzero(shown)
+            return dataclasses.replace(
+                layer,
+                texts=tuple(texts[place] for place in kept),
+                anchors=anchors[kept],
+                heights=layer.heights[kept],
             )
         case Pixels(values=values):
             straight = straight_from_photo(pixel_grid(size), k1, size=size).numpy()

@@ -8,13 +8,16 @@ import zlib
 
 import numpy as np
 
-from p3i.paint.scene import Colour, Dots, Pixels, Scene, Strokes
+from p3i.paint.scene import TO_BASELINE, Colour, Dots, Labels, Pixels, Scene, Strokes
 from p3i.paint.svg import joined, number
 from p3i.vision.write import encode
 
 _POINTS_PER_PX = 0.75
 _MOST_POINTS = 14_400
 """Pages of viewers end at 200 inches."""
+
+_HELVETICA = 0.59
+"""The mean width of capitals and digits, as a share of their size."""
 
 _BEZIER = 4 / 3 * (math.sqrt(2) - 1)
 """Where the control points of a quarter circle lie."""
@@ -40,13 +43,17 @@ def pdf(scene: Scene) -> bytes:
                 parts.append(_strokes(layer, opacities))
             case Dots():
                 parts += _dots(layer)
+            case Labels():
+                parts += _labels(layer)
     states = " ".join(f"/O{k} << /CA {number(value)} >>" for k, value in enumerate(opacities))
     named = " ".join(f"/P{k} {place} 0 R" for k, place in enumerate(pictures))
+    with_text = any(isinstance(layer, Labels) for layer in scene.layers)
+    font = "/Font << /F << /Type /Font /Subtype /Type1 /BaseFont /Helvetica >> >> " if with_text else ""
     objects[0] = b"<< /Type /Catalog /Pages 2 0 R >>"
     objects[1] = b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>"
     objects[2] = (
         f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {number(width * scale)} {number(height * scale)}] "
-        f"/Contents 4 0 R /Resources << /ExtGState << {states} >> /XObject << {named} >> >> >>"
+        f"/Contents 4 0 R /Resources << {font}/ExtGState << {states} >> /XObject << {named} >> >> >>"
     ).encode("ascii")
     objects[3] = _stream("/Filter /FlateDecode", zlib.compress("\n".join(parts).encode("ascii")))
     return _file(objects)
@@ -72,6 +79,26 @@ def _dots(dots: Dots) -> list[str]:
         cos, sin = math.cos(angle), math.sin(angle)
         turn = f"{cos:.5f} {sin:.5f} {-sin:.5f} {cos:.5f} {number(x)} {number(y)} cm"
         lines.append(f"q {_rgb(colour)} rg {_rgb(rim)} RG {turn} {_ellipse(a, b)} b Q")
+    return lines
+
+
+def _labels(labels: Labels) -> list[str]:
+    lines = [f"{_rgb(labels.colour)} rg {_rgb(labels.rim)} RG"]
+    for text, (x, y), size, rim in zip(
+        labels.texts,
+        labels.anchors.tolist(),
+        labels.heights.tolist(),
+        labels.rim_widths.tolist(),
+        strict=True,
+    ):
+        word = text.encode("latin-1", "replace").decode("latin-1")
+        word = "".join(
+            f"\\{ord(mark):03o}" if mark in "()\\" or not " " <= mark <= "~" else mark for mark in word
+        )
+        left = x - _HELVETICA * size * len(text) / 2
+        at = f"1 0 0 -1 {number(left)} {number(y + TO_BASELINE * size)} Tm ({word}) Tj"
+        # First the rim, then the letters over it.
+        lines += [f"{number(2 * rim)} w BT /F {number(size)} Tf {mode} Tr {at} ET" for mode in (1, 0)]
     return lines
 
 

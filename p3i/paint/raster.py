@@ -5,11 +5,14 @@ blended as they are stored, as browsers and viewers of vector pictures do.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import cv2
 import numpy as np
+from PIL import Image as Pil
+from PIL import ImageDraw, ImageFont
 
-from p3i.paint.scene import Dots, Pixels, Scene, Strokes
+from p3i.paint.scene import TO_BASELINE, Dots, Labels, Pixels, Scene, Strokes
 from p3i.size import Size
 
 _FINE = 4
@@ -36,6 +39,8 @@ def paint(scene: Scene) -> np.ndarray:
                 _paint_strokes(canvas, layer)
             case Dots():
                 _paint_dots(canvas, layer)
+            case Labels():
+                _paint_labels(canvas, layer)
     return canvas
 
 
@@ -95,6 +100,38 @@ def _paint_dots(canvas: np.ndarray, dots: Dots) -> None:
             u, v = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
             blend(window, rim, _ellipse_coverage(u, v, axes + dots.rim_width / 2))
             blend(window, colour, _ellipse_coverage(u, v, np.maximum(axes - dots.rim_width / 2, 0.3)))
+
+
+def _paint_labels(canvas: np.ndarray, labels: Labels) -> None:
+    height, width = canvas.shape[:2]
+    for text, (x, y), size, rim in zip(
+        labels.texts,
+        labels.anchors.tolist(),
+        labels.heights.tolist(),
+        labels.rim_widths.tolist(),
+        strict=True,
+    ):
+        font = _font(max(1, round(size)))
+        reach = int(np.ceil(font.getlength(text) / 2 + rim + 2)), int(np.ceil(size + rim + 2))
+        left, top = round(x) - reach[0], round(y) - reach[1]
+        box = Pil.new("L", (2 * reach[0] + 1, 2 * reach[1] + 1))
+        foot = (x - left, y - top + TO_BASELINE * size)
+        for stroke, colour in ((rim, labels.rim), (0, labels.colour)):
+            box.paste(0, (0, 0, *box.size))
+            ImageDraw.Draw(box).text(foot, text, 255, font, anchor="ms", stroke_width=round(stroke))
+            rows = slice(max(0, top), max(0, min(height, top + box.height)))
+            columns = slice(max(0, left), max(0, min(width, left + box.width)))
+            covered = np.asarray(box, np.float32)[
+                rows.start - top : rows.stop - top, columns.start - left : columns.stop - left
+            ]
+            if covered.size:
+                blend(canvas[rows, columns], np.array(colour, np.uint8), covered / np.float32(255))
+
+
+@lru_cache(maxsize=64)
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """The font that Pillow brings along."""
+    return ImageFont.load_default(size=size)
 
 
 def _ellipse_coverage(u: np.ndarray, v: np.ndarray, axes: np.ndarray) -> np.ndarray:

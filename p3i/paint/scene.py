@@ -22,6 +22,12 @@ _HORIZON: Colour = (214, 40, 57)
 _LAST_HUE = 0.78
 """Hues run from red to violet and stop before they come back to red."""
 
+_RIM_SHARE = 0.13
+"""The rim of letters, as a share of their size."""
+
+TO_BASELINE = 0.36
+"""From the middle of capitals and digits down to the line that they stand on, as a share of their size."""
+
 _SMALLEST_PX = 1.1
 """No dot gets thinner than this, however far away it lies."""
 
@@ -57,7 +63,26 @@ class Dots:
     rim_width: float
 
 
-Layer = Pixels | Strokes | Dots
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """Words: `texts` [M], the middle of each at `anchors` [M, 2], font sizes `heights` [M] in pixels.
+
+    Light letters with a dark rim, to be read on any ground.
+    """
+
+    texts: tuple[str, ...]
+    anchors: np.ndarray
+    heights: np.ndarray
+    colour: Colour = WHITE
+    rim: Colour = _INK
+
+    @property
+    def rim_widths(self) -> np.ndarray:
+        """How far the rim of each word reaches beyond its letters, in pixels: [M]."""
+        return np.maximum(1.0, self.heights * _RIM_SHARE)
+
+
+Layer = Pixels | Strokes | Dots | Labels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

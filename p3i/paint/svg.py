@@ -5,7 +5,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from p3i.paint.scene import Colour, Dots, Pixels, Scene, Strokes
+from p3i.paint.scene import TO_BASELINE, Colour, Dots, Labels, Pixels, Scene, Strokes
 from p3i.vision.write import encode
 
 PROGRAM_TAG = "{urn:p3i}program"
@@ -36,6 +36,8 @@ def svg(scene: Scene, *, program_text: str) -> str:
                 lines.append(_strokes(layer))
             case Dots():
                 lines += _dots(layer)
+            case Labels():
+                lines += _labels(layer)
     return "\n".join([*lines, "</svg>", ""])
 
 
@@ -84,6 +86,25 @@ def _dots(dots: Dots) -> list[str]:
         lines.append(
             f'<ellipse rx="{number(a)}" ry="{number(b)}" fill="{_hex(colour)}" stroke="{_hex(rim)}" '
             f'transform="translate({number(x)} {number(y)}) rotate({number(angle)})"/>'
+        )
+    return [*lines, "</g>"]
+
+
+def _labels(labels: Labels) -> list[str]:
+    lines = [
+        f'<g font-family="sans-serif" text-anchor="middle" fill="{_hex(labels.colour)}" '
+        f'stroke="{_hex(labels.rim)}" stroke-linejoin="round" paint-order="stroke">'
+    ]
+    for text, (x, y), size, rim in zip(
+        labels.texts,
+        labels.anchors.tolist(),
+        labels.heights.tolist(),
+        labels.rim_widths.tolist(),
+        strict=True,
+    ):
+        lines.append(
+            f'<text x="{number(x)}" y="{number(y + TO_BASELINE * size)}" font-size="{number(size)}" '
+            f'stroke-width="{number(2 * rim)}">{escape(text)}</text>'
         )
     return [*lines, "</g>"]
 

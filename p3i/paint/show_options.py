@@ -1,0 +1,67 @@
+"""The one record of options that `show` takes: the Python API and the command line both read it.
+
+Each field carries the sentence that documents it. Imports neither torch nor numpy.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+from p3i.errors import UsageError
+
+LABELS = ("names", "index", "none")
+"""What may be written at the objects."""
+
+KINDS = ("png", "svg", "pdf")
+"""What an overlay may be written as."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowOptions:
+    """What to draw over the photo. Raises UsageError for a value out of range."""
+
+    labels: Annotated[
+        Literal["names", "index", "none"],
+        "What to write at the objects, where there is room: names as `p3i points` gives them, i and j, or "
+        "nothing.",
+    ] = "names"
+    points: Annotated[bool, "Mark each object by a dot, or by a cross where it is not there."] = True
+    cells: Annotated[bool, "Outline the cells of the objects."] = True
+    horizon: Annotated[bool, "Draw the plane's vanishing line, where it crosses the picture."] = True
+    extent: Annotated[bool, "Draw a line around all cells together."] = True
+    presence: Annotated[bool, "Look which objects are there; else each gets a dot."] = True
+    longer: Annotated[int | None, "Reduce the picture to a longer side of N pixels first."] = None
+    focal_mm: Annotated[
+        float | None,
+        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.labels not in LABELS:
+            raise UsageError(f"labels are {', '.join(LABELS)}, not {self.labels!r}")
+        if self.longer is not None and not 16 <= self.longer <= 20_000:
+            raise UsageError(f"the longer side has between 16 and 20000 pixels, not {self.longer}")
+        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+
+
+def sentence(name: str) -> str:
+    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
+    return get_type_hints(ShowOptions, include_extras=True)[name].__metadata__[0]
+
+
+def default(name: str) -> Any:
+    """The default of the field `name`; raises KeyError where there is no such field."""
+    return {field.name: field.default for field in dataclasses.fields(ShowOptions)}[name]
+
+
+def kind_of(path: str | PathLike[str]) -> str:
+    """The kind of file that a name asks for; raises UsageError for one that is not drawn."""
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in KINDS:
+        known = ", ".join(f".{kind}" for kind in KINDS)
+        raise UsageError(f"cannot tell the kind of picture from {fspath(path)!r}: end the name in {known}")
+    return suffix
