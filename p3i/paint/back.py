@@ -1,8 +1,8 @@
 """An edited straight view taken back into its photo; what was not edited stays as it is, to the bit.
 
 A photo pixel changes where the view's pixels that it is seen through differ from the view as it was painted.
-It is then read from the edited view, sharp and free of aliasing, and blended in by how much of what it is read
-from was edited.
+It is then read from the edited view, sharp and free of aliasing, and blended in by how much of what it is
+read from was edited.
 """
 
 import numpy as np

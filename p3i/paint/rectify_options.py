@@ -53,8 +53,8 @@ class RectifyOptions:
 
     crop: Annotated[
         str,
-        "What to show: the pattern with a cell's margin, the largest rectangle inside which all is known, all "
-        "of the photo that is not too near to the horizon, or the photo's own canvas and place.",
+        "What to show: the pattern with a cell's margin, the largest rectangle inside which all is known, "
+        "all of the photo that is not too near to the horizon, or the photo's own canvas and place.",
     ] = "pattern"
     scale: Annotated[
         float | None,
@@ -64,8 +64,8 @@ class RectifyOptions:
     max_px: Annotated[int, "Make no view of more than N pixels (width times height)."] = 100_000_000
     cell: Annotated[
         CellSize | None,
-        "The true size of one cell of a lattice, such as 600x600mm: sets the proportions, whatever the focal, and "
-        "the resolution (dpi) of the file.",
+        "The true size of one cell of a lattice, such as 600x600mm: sets the proportions, whatever the "
+        "focal, and the resolution (dpi) of the file.",
     ] = None
     upright: Annotated[
         bool, "Turn the view so that the lattice's rows run across, or leave it as the camera saw it."

@@ -1,8 +1,8 @@
 """A straightened view before it is painted: which way up, how large, and how its pixels lie in the photo.
 
 Convention: arrays of float64; matrices are named target_from_source; pixel centres at whole numbers.
-*Upright* units are the plane's after the turn (and, where a cell's true size is known, the affine map that makes it
-metric): program units, or millimetres. `pinhole` pixels are the photo's after its lens is straightened; they
+*Upright* units are the plane's after the turn (and, where a cell's true size is known, the affine map that makes
+it metric): program units, or millimetres. `pinhole` pixels are the photo's after its lens is straightened; they
 are the photo's own where the program's header names no lens_k1.
 """
 
@@ -21,6 +21,9 @@ from p3i.vision.sheet import project
 
 _SKEW_SNAP = 0.12
 """A row's shift against the next, in cells, that counts as none or as half a cell."""
+
+_RIGHT_DEG = 4.0
+"""Directions that are this near to a right angle count as standing at one: an assumed focal skews by as much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,12 +127,25 @@ def _metric(basis: np.ndarray, cell: CellSize) -> np.ndarray:
 
 
 def _off_axis_rad(basis: np.ndarray) -> float:
-    """The angle of the basis vector that runs most nearly along x: u, if it is within 45 degrees."""
-    angles = [math.remainder(math.atan2(vector[1], vector[0]), math.pi) for vector in basis]
-    if abs(angles[0]) <= math.pi / 4 + 1e-9:
-        return angles[0]
-    down = [math.remainder(math.atan2(vector[1], vector[0]) - math.pi / 2, math.pi) for vector in basis]
-    return min([*angles, *down], key=abs)
+    """The least angle by which a view must turn back for the lattice to stand straight in it.
+
+    A lattice has a pair of directions at right angles, u and v or (where they are as long as each other, as on a
+    chessboard) u + v and u - v, or both; one with none stands on u or v.
+    """
+    u, v = basis
+    pairs = [(first, second) for first, second in ((u, v), (u + v, u - v)) if _square(first, second)]
+    angles = [math.atan2(vector[1], vector[0]) for pair in pairs or [(u, v)] for vector in pair]
+    # Of a right angle either side may lie across; an eighth of a degree keeps equal choices apart.
+    turns = [math.remainder(angle, math.pi / 2 if pairs else math.pi) for angle in angles]
+    if not pairs:
+        turns += [math.remainder(angle - math.pi / 2, math.pi) for angle in angles]
+    least = min(abs(turn) for turn in turns)
+    return next(turn for turn in turns if abs(turn) <= least + math.radians(0.125))
+
+
+def _square(first: np.ndarray, second: np.ndarray) -> bool:
+    cosine = abs(float(first @ second)) / float(np.linalg.norm(first) * np.linalg.norm(second))
+    return cosine <= math.sin(math.radians(_RIGHT_DEG))
 
 
 def _turn(angle_rad: float) -> np.ndarray:

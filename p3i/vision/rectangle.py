@@ -20,7 +20,7 @@ _LINE = 1024
 
 
 def largest_rectangle(known: Known, low: Array, high: Array, *, coarse: int) -> tuple[Array, Array]:
-    """The corners (low [2], high [2]) of the largest rectangle, in the box of `low` and `high`, that is known.
+    """The corners (low [2], high [2]) of the largest known rectangle in the box of `low` and `high`.
 
     `coarse` is the number of cells along the box's longer side. Where nothing is known it is the box's
     middle, with no extent.

@@ -1,16 +1,12 @@
 """Straightened views: where the lattice comes to lie, what is known, how sharp it is, and the way back."""
 
-import dataclasses
-
 import cv2
 import numpy as np
 import pytest
 
 from p3i import loads
-from p3i.errors import ProgramError, UsageError
 from p3i.paint.rectify import Rectified, rectify
-from p3i.paint.rectify_options import CROPS, CellSize, RectifyOptions, parse_cell
-from p3i.paint.straightened import Straightened
+from p3i.paint.rectify_options import CROPS
 from p3i.size import Size
 from p3i.vision.decode import Source
 from p3i.vision.image import Image

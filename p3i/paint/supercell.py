@@ -1,0 +1,101 @@
+"""The smallest rectangle that a lattice repeats in.
+
+Convention: a lattice's basis is [2, 2], rows u and v; a super-cell's sides are whole combinations of them,
+the first running most nearly to the right (x), the second down (y).
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+MOST = 4
+"""Sides reach up to this many steps of u and of v."""
+
+MOST_CELLS = 8
+"""A rectangle of more cells than this is no texture that anyone would want."""
+
+TOLERANCE_DEG = 3.0
+"""Sides that are this near to a right angle count as rectangular: an assumed focal skews by as much."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SuperCell:
+    """`steps` [2, 2] int, rows the two sides in steps of (u, v); `sides` [2, 2] the same in program units.
+
+    `cells` is how many of the lattice's cells it holds. `shear_deg` is how far the sides are from a right
+    angle, which a rectangular texture straightens.
+    """
+
+    steps: np.ndarray
+    sides: np.ndarray
+    cells: int
+    shear_deg: float
+
+    @property
+    def rectangular(self) -> bool:
+        """Whether the sides are at right angles, up to the tolerance."""
+        return abs(self.shear_deg) <= TOLERANCE_DEG
+
+
+def supercell(basis: np.ndarray) -> SuperCell:
+    """The rectangle of fewest cells; where none is rectangular, the nearest to it of up to four cells.
+
+    `basis` [2, 2] has rows u and v, not parallel.
+    """
+    shortest = _reduced(basis)
+    steps = [np.array(pair) @ shortest for pair in product(range(-MOST, MOST + 1), repeat=2) if any(pair)]
+    vectors = [(pair, pair @ basis) for pair in steps if math.gcd(*pair.tolist()) == 1]
+    for widest_deg in (45.0, 90.0):
+        rights = [(pair, p) for pair, p in vectors if abs(_angle_deg(p)) <= widest_deg + 1e-9]
+        found = [
+            (_rank(cell), cell)
+            for first in rights
+            for second in vectors
+            if (cell := _cell(first, second)) is not None
+        ]
+        if found:
+            break
+    return min(found, key=lambda ranked: ranked[0])[1]
+
+
+def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> SuperCell | None:
+    """The super-cell of two sides (steps, vector); None where it is too large, or turns the wrong way."""
+    (across, p), (down, q) = first, second
+    cells = abs(int(across[0] * down[1] - across[1] * down[0]))
+    turn = float(p[0] * q[1] - p[1] * q[0])
+    if not 1 <= cells <= MOST_CELLS or turn <= 0:
+        return None
+    shear_deg = 90.0 - math.degrees(math.atan2(turn, float(p @ q)))
+    if abs(shear_deg) > TOLERANCE_DEG and cells > 4:
+        return None
+    return SuperCell(np.array([across, down]), np.array([p, q]), cells, shear_deg)
+
+
+def _rank(cell: SuperCell) -> tuple[float, ...]:
+    """Less is better; no two super-cells of a lattice rank alike."""
+    off = abs(cell.shear_deg)
+    # Of those that are skewed, a cell more must halve the angle.
+    order = (0.0, cell.cells, off) if cell.rectangular else (1.0, off * 2 ** (cell.cells - 1), 0.0)
+    longer = float(np.linalg.norm(cell.sides, axis=1).max())
+    lean = abs(_angle_deg(cell.sides[0]))
+    return (*(round(number, 6) for number in (*order, longer, lean)), *cell.steps.ravel().tolist())
+
+
+def _reduced(basis: np.ndarray) -> np.ndarray:
+    """Steps [2, 2] of the two shortest vectors that span the lattice (Lagrange and Gauss)."""
+    steps = np.eye(2, dtype=int)
+    for _ in range(64):
+        u, v = steps @ basis
+        if u @ u > v @ v:
+            steps, (u, v) = steps[::-1].copy(), (v, u)
+        shift = round(float(u @ v / (u @ u)))
+        if shift == 0:
+            break
+        steps[1] -= shift * steps[0]
+    return steps
+
+
+def _angle_deg(vector: np.ndarray) -> float:
+    return math.degrees(math.atan2(vector[1], vector[0]))

@@ -1,0 +1,328 @@
+"""A seamless texture of a pattern's cell: the robust mean of its cells, or the best of them."""
+
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import cv2
+import numpy as np
+
+from p3i.errors import ProgramError
+from p3i.grammar.ast import Program
+from p3i.paint.light import Light, even, fitted_light
+from p3i.paint.patches import Patch, Patches, finest, in_photo, patches_of
+from p3i.paint.picture import Picture, depth, opacity
+from p3i.paint.placed import placed
+from p3i.paint.rectify_options import changed
+from p3i.paint.seam import Seam, seam_of, wrapped
+from p3i.paint.supercell import TOLERANCE_DEG
+from p3i.paint.tile_options import TileOptions
+from p3i.paint.view import refuse_huge
+from p3i.size import Size
+from p3i.vision.image import Image
+from p3i.vision.resample import resample
+
+_MOST_PATCHES, _MOST_SAMPLES = 64, 30_000_000
+"""No tile is made of more patches, or of more pixels of patches, than this; the nearest are taken."""
+
+_LEAST_SEEN = 0.25
+"""A patch of which less than this is known is left out."""
+
+_LIGHT_SIDE = 20
+"""The light is fitted to this many places a side of each patch."""
+
+_MOST_SHIFT = 0.08
+"""Cells that lie off their place by more than this share of a side are not moved onto it."""
+
+_OVERLAP = 0.16
+"""The share of the best cell's sides over which it is blended into what follows on the other side."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tile:
+    """One tile: float32 `pixels` [H, W, 3] in 0..1, `known` [H, W]; `patches` says what it is made of.
+
+    `used` are the (i, j) of the cells, `light` is the gain that was removed, `seam` how well it wraps.
+    """
+
+    pixels: np.ndarray
+    known: np.ndarray
+    patches: Patches
+    used: tuple[tuple[int, int], ...]
+    light: Light
+    seam: Seam
+    options: TileOptions
+    bits: int
+    icc: bytes | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> Size:
+        """The canvas of one tile."""
+        return Size(self.pixels.shape[1], self.pixels.shape[0])
+
+    def paint(self) -> Picture:
+        """The tile, repeated as the options ask."""
+        top = 2**self.bits - 1
+        kind = np.uint8 if self.bits == 8 else np.uint16
+        across, down = self.options.repeat
+        values = np.tile(np.rint(self.pixels * top).astype(kind), (down, across, 1))
+        alpha = None if self.known.all() else np.tile(self.known.astype(kind) * kind(top), (down, across))
+        return Picture(values, alpha, self.icc)
+
+    def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
+        """Paint and write the tile: `Picture.save`."""
+        self.paint().save(path, kind=kind, force=force)
+
+    def record(self) -> dict[str, Any]:
+        """What the tile is, as plain JSON values; docs/rectify.md says what each means."""
+        cell = self.patches.cell
+        return {
+            "tile": [self.size.width, self.size.height],
+            "repeat": list(self.options.repeat),
+            "from": self.options.source,
+            "structure": "ring" if cell is None else "lattice",
+            "cells": 1 if cell is None else cell.cells,
+            "sides": None if cell is None else cell.steps.tolist(),
+            "shear_deg": None if cell is None else round(cell.shear_deg, 4) + 0.0,
+            "used": [list(index) for index in self.used],
+            "seam": self.seam.record(),
+        }
+
+
+def tile(photo: Image, program: Program, options: TileOptions | None = None, **changes: Any) -> Tile:
+    """The texture of `photo`'s pattern by `program`; `changes` are fields of TileOptions.
+
+    Raises ProgramError for a program that is neither a lattice nor rings or has no object on the photo,
+    UsageError for options that cannot be.
+    """
+    options = changed(options or TileOptions(), changes, verb="tile")
+    laid = placed(program, photo, focal_mm=options.focal_mm)
+    k1 = (program.header.lens_k1 if program.header else None) or None
+    patches = patches_of(laid)
+    size = options.size or _size(patches)
+    whole = Size(size.width * options.repeat[0], size.height * options.repeat[1])
+    refuse_huge(whole, max_px=options.max_px)
+    stack = _stack(photo, patches, size, k1=k1)
+    light = even(np.zeros(2))
+    if options.light:
+        light = _light(stack, size)
+        stack = _lit(stack, size, light)
+    mean, known = robust_mean(stack.values, stack.seen)
+    stack = _registered(stack, photo, mean, size=size, k1=k1, light=light)
+    mean, known = robust_mean(stack.values, stack.seen)
+    used = tuple(patch.index for patch in stack.pieces)
+    notes = list(photo.notes)
+    pixels = mean
+    if options.source == "best":
+        best = _best(stack, mean)
+        pixels = _blended(photo, stack, best, mean, size=size, k1=k1, light=light)
+        used = (stack.pieces[best].index,)
+    cell = patches.cell
+    if cell is not None and not cell.rectangular:
+        notes.append(
+            f"no small rectangle repeats in this lattice within {TOLERANCE_DEG:g} degrees: the nearest is "
+            f"skewed by {cell.shear_deg:.1f} degrees, which the tile straightens"
+        )
+    if not known.all():
+        notes.append(f"{100 * (1 - known.mean()):.1f} % of the tile is seen in no cell, and transparent")
+    pixels = np.clip(pixels, 0, 1).astype(np.float32)
+    seam = seam_of(pixels, known, down=cell is not None)
+    return Tile(
+        pixels,
+        known,
+        patches,
+        used,
+        light,
+        seam,
+        options,
+        depth(photo),
+        photo.source.icc,
+        tuple(notes),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stack:
+    """Patches as arrays: `values` uint16 [K, H, W, 3], `seen` [K, H, W]; `shifts` [K, 2] in pixels."""
+
+    patches: Patches
+    pieces: tuple[Patch, ...]
+    values: np.ndarray
+    seen: np.ndarray
+    shifts: np.ndarray
+
+
+def _size(patches: Patches) -> Size:
+    """As many pixels as the photo has for a cell at the pattern's middle, where it is sharpest there."""
+    centers = np.array([piece.center for piece in patches.pieces])
+    middle = centers[np.argsort(np.linalg.norm(centers - centers.mean(axis=0), axis=1), kind="stable")[:1]]
+    width, height = np.maximum(8, np.round(patches.extent * finest(patches.placed, middle))).astype(int)
+    return Size(int(width), int(height))
+
+
+def _sampled(
+    photo: Image, patches: Patches, piece: Patch, size: Size, *, k1: float | None, shift: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """One patch: uint16 [H, W, 3], and what of it the photo knows and the program draws."""
+    points = in_photo(patches.placed, piece, size, k1=k1, shift=shift)
+    values, alpha = resample(photo.pixels, opacity(photo), points, size=size, bits=16)
+    drawn = patches.drawn(piece.plane(*_places(size)))
+    return values, drawn if alpha is None else drawn & (alpha >= 0x8000)
+
+
+def _places(size: Size) -> tuple[np.ndarray, np.ndarray]:
+    """The pixel centres of a patch in -0.5..0.5: x [w], y [h]."""
+    return (np.arange(size.width) + 0.5) / size.width - 0.5, (
+        np.arange(size.height) + 0.5
+    ) / size.height - 0.5
+
+
+def _stack(photo: Image, patches: Patches, size: Size, *, k1: float | None) -> _Stack:
+    most = int(np.clip(_MOST_SAMPLES // (size.width * size.height), 1, _MOST_PATCHES))
+    pieces: list[Patch] = []
+    values: list[np.ndarray] = []
+    seen: list[np.ndarray] = []
+    for piece in patches.pieces:
+        found, known = _sampled(photo, patches, piece, size, k1=k1, shift=np.zeros(2))
+        if known.mean() >= _LEAST_SEEN:
+            pieces.append(piece)
+            values.append(found)
+            seen.append(known)
+        if len(pieces) == most:
+            break
+    if not pieces:
+        raise ProgramError("no cell of the pattern is seen well enough to make a tile of")
+    return _Stack(patches, tuple(pieces), np.stack(values), np.stack(seen), np.zeros((len(pieces), 2)))
+
+
+def _light(stack: _Stack, size: Size) -> Light:
+    """The light over the cells, from a few hundred places of each, averaged around."""
+    side = Size(min(_LIGHT_SIDE, size.width), min(_LIGHT_SIDE, size.height))
+    x, y = _places(side)
+    small = (side.width, side.height)
+    values = [cv2.resize(value, small, interpolation=cv2.INTER_AREA) for value in stack.values]
+    seen = [
+        cv2.resize(known.astype(np.float32), small, interpolation=cv2.INTER_AREA) > 0.999
+        for known in stack.seen
+    ]
+    points = np.stack([piece.plane(x, y) for piece in stack.pieces])
+    count = len(stack.pieces)
+    return fitted_light(
+        np.stack(values).reshape(count, -1, 3) / 65535.0,
+        np.stack(seen).reshape(count, -1),
+        points.reshape(count, -1, 2),
+    )
+
+
+def _lit(stack: _Stack, size: Size, light: Light) -> _Stack:
+    """The stack in even light."""
+    values = np.stack(
+        [_relit(value, piece, size, light) for value, piece in zip(stack.values, stack.pieces, strict=True)]
+    )
+    return _Stack(stack.patches, stack.pieces, values, stack.seen, stack.shifts)
+
+
+def _relit(value: np.ndarray, piece: Patch, size: Size, light: Light) -> np.ndarray:
+    if not len(light.terms):
+        return value
+    gain = light.gain(piece.plane(*_places(size)))
+    return np.rint(np.clip(value / gain, 0, 65535)).astype(np.uint16)
+
+
+def robust_mean(values: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The mean [H, W, 3] (0..1) of uint16 patches [K, H, W, 3] without what stands out; where any is seen.
+
+    About the median: samples farther from it than 2.5 times the typical distance are left out.
+    """
+    count, height, width, _ = values.shape
+    mean = np.zeros((height, width, 3), np.float32)
+    rows = max(1, 2_000_000 // (count * width * 3))
+    for first in range(0, height, rows):
+        part = slice(first, first + rows)
+        block = values[:, part].astype(np.float32) / 65535
+        known = seen[:, part]
+        block[~known] = np.nan
+        lone = ~known.any(axis=0)
+        block[:, lone] = 0
+        middle = np.nanmedian(block, axis=0)
+        apart = np.abs(block - middle).mean(axis=3)
+        typical = np.nanmedian(apart, axis=0)
+        near = np.nan_to_num(apart, nan=np.inf) <= 2.5 * typical + 1 / 512
+        share = near / np.maximum(near.sum(axis=0), 1)
+        mean[part] = (np.nan_to_num(block) * share[:, :, :, None]).sum(axis=0)
+    return mean, seen.any(axis=0)
+
+
+def _registered(
+    stack: _Stack, photo: Image, mean: np.ndarray, *, size: Size, k1: float | None, light: Light
+) -> _Stack:
+    """The stack with cells that lie a little off moved onto the mean, where that makes them more alike."""
+    if min(size.width, size.height) < 16 or len(stack.pieces) < 3:
+        return stack
+    window = cv2.createHanningWindow((size.width, size.height), cv2.CV_32F)
+    grey = np.ascontiguousarray(mean.mean(axis=2))
+    values, seen, shifts = stack.values.copy(), stack.seen.copy(), stack.shifts.copy()
+    for k, piece in enumerate(stack.pieces):
+        here = np.where(seen[k][:, :, None], values[k] / np.float32(65535), mean)
+        (x, y), _ = cv2.phaseCorrelate(grey, np.ascontiguousarray(here.mean(axis=2), np.float32), window)
+        shift = np.array([x, y])
+        if (np.abs(shift) > _MOST_SHIFT * np.array([size.width, size.height])).any() or np.hypot(x, y) < 0.05:
+            continue
+        moved, known = _sampled(photo, stack.patches, piece, size, k1=k1, shift=shift)
+        moved = _relit(moved, piece, size, light)
+        both = known & seen[k]
+        if both.mean() < 0.5 * seen[k].mean():
+            continue
+        before = np.abs(values[k][both] / np.float32(65535) - mean[both]).mean()
+        if np.abs(moved[both] / np.float32(65535) - mean[both]).mean() < 0.98 * before:
+            values[k], seen[k], shifts[k] = moved, known, shift
+    return _Stack(stack.patches, stack.pieces, values, seen, shifts)
+
+
+def _best(stack: _Stack, mean: np.ndarray) -> int:
+    """The sharpest of the cells that are wholly seen and nearly as like the mean as any."""
+    whole = stack.seen.mean(axis=(1, 2))
+    candidates = np.flatnonzero(whole >= min(0.999, float(whole.max())))
+    apart, sharp = [], []
+    for k in candidates:
+        value = stack.values[k] / np.float32(65535)
+        apart.append(float(np.abs(value - mean)[stack.seen[k]].mean()))
+        grey = value.mean(axis=2)
+        sharp.append(float(np.abs(np.diff(grey, axis=0)).mean() + np.abs(np.diff(grey, axis=1)).mean()))
+    limit = 1.25 * min(apart) + 1e-9
+    good = [k for k in range(len(candidates)) if apart[k] <= limit]
+    return int(candidates[max(good, key=lambda k: sharp[k])])
+
+
+def _blended(
+    photo: Image,
+    stack: _Stack,
+    best: int,
+    mean: np.ndarray,
+    *,
+    size: Size,
+    k1: float | None,
+    light: Light,
+) -> np.ndarray:
+    """The best cell [H, W, 3] in 0..1, its first rows and columns blended into what follows its last."""
+    over = [max(2, round(_OVERLAP * side)) for side in (size.width, size.height)]
+    piece, shift = stack.pieces[best], stack.shifts[best]
+    down = stack.patches.cell is not None
+    larger = Size(size.width + over[0], size.height + (over[1] if down else 0))
+    # The same piece on a larger canvas: its pixels go on beyond the sides.
+    x = (np.arange(larger.width) + 0.5) / size.width - 0.5
+    y = (np.arange(larger.height) + 0.5) / size.height - 0.5
+    points = in_photo(stack.patches.placed, piece, size, k1=k1, shift=shift)
+    values, alpha = resample(photo.pixels, opacity(photo), points, size=larger, bits=16)
+    known = np.ones(values.shape[:2], bool) if alpha is None else alpha >= 0x8000
+    plane = piece.plane(x, y)
+    known &= stack.patches.drawn(plane)
+    found = values / np.float32(65535)
+    if len(light.terms):
+        found = found / light.gain(plane)
+    repeated = np.pad(
+        mean, ((0, larger.height - size.height), (0, larger.width - size.width), (0, 0)), "wrap"
+    )
+    found = np.where(known[:, :, None], np.clip(found, 0, 1), repeated)
+    return wrapped(found.astype(np.float32), size)

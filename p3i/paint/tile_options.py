@@ -1,0 +1,52 @@
+"""The one record of options that `tile` takes: the Python API and the command line both read it.
+
+Imports neither torch nor numpy: `p3i tile --help` reads this file.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from p3i.errors import UsageError
+from p3i.size import Size
+
+SOURCES = ("mean", "best")
+"""What a tile is made of."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TileOptions:
+    """Of what to make a tile, and how large. Raises UsageError for a value out of range."""
+
+    source: Annotated[
+        str,
+        "Make the tile from the robust mean of the cells, or from the best single cell, its borders blended "
+        "into what follows on the other side.",
+    ] = "mean"
+    size: Annotated[
+        Size | None,
+        "Width and height of one tile in pixels; by default as fine as the photo is at the pattern's middle.",
+    ] = None
+    repeat: Annotated[tuple[int, int], "Lay the tile this many times across and down."] = (1, 1)
+    light: Annotated[bool, "Remove the light's gradient over the cells, or keep it as it is."] = True
+    max_px: Annotated[int, "Refuse to make pictures of more than N pixels (width times height)."] = (
+        100_000_000
+    )
+    focal_mm: Annotated[
+        float | None,
+        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.source not in SOURCES:
+            raise UsageError(f"a tile is made from one of {', '.join(SOURCES)}, not {self.source!r}")
+        if len(self.repeat) != 2 or not all(1 <= count <= 10_000 for count in self.repeat):
+            raise UsageError(f"a tile is repeated 1 to 10000 times across and down, not {self.repeat}")
+        if self.size is not None and min(self.size.width, self.size.height) < 4:
+            raise UsageError(
+                f"a tile has at least 4 pixels a side, not {self.size.width} x {self.size.height}"
+            )
+        if self.max_px < 1:
+            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
