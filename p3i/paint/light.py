@@ -27,7 +27,8 @@ class Light:
 
     def gain(self, points: np.ndarray) -> np.ndarray:
         """The gain [..., 3] at plane points [..., 2]; 1 in the middle of the light."""
-        log_gain = _monomials((points - self.middle) / self.radius, len(self.terms)) @ self.terms
+        at = (points - self.middle.astype(points.dtype)) / points.dtype.type(self.radius)
+        log_gain = _monomials(at, len(self.terms)) @ self.terms.astype(points.dtype)
         return np.exp(np.clip(log_gain, -_MOST_LOG_GAIN, _MOST_LOG_GAIN))
 
 

@@ -1,7 +1,8 @@
 """The pieces of a photo that a tile is made of: each the same stretch of the pattern, one object on.
 
-Convention: a patch is a canvas of `size`, pixel centres at whole numbers; its middle lies on one object of
-the program. In a lattice x and y run along the sides of the super-cell; in a ring x is the angle, y the radius.
+Convention: a patch is a canvas of `size`, pixel centres at whole numbers; its middle lies on one object
+of the program. In a lattice x and y run along the sides of the super-cell; in a ring x is the angle, y the
+radius.
 """
 
 from collections.abc import Callable
@@ -23,26 +24,30 @@ Plane = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """One piece: its object's (i, j), its object's plane point, and where its points lie on the plane."""
+    """One piece: its object's (i, j), its object's plane point, and where its points lie on the plane.
+
+    `plane_from_patch` [3, 3] says the same where the piece is a parallelogram, for speed.
+    """
 
     index: tuple[int, int]
     center: np.ndarray
     plane: Plane
+    plane_from_patch: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patches:
     """All pieces, the best seen first; `extent` [2] is the width and height of one in program units.
 
-    `cell` is a lattice's super-cell, None for rings; `drawn` says which plane points [..., 2] belong to cells
-    that the program draws.
+    `cell` is a lattice's super-cell, None for rings; `drawn` says which points x [w], y [h] of a
+    piece belong to cells that the program draws, [h, w].
     """
 
     placed: Placed
     pieces: tuple[Patch, ...]
     extent: np.ndarray
     cell: SuperCell | None
-    drawn: Callable[[np.ndarray], np.ndarray]
+    drawn: Callable[[Patch, np.ndarray, np.ndarray], np.ndarray]
 
 
 def patches_of(placed: Placed) -> Patches:
@@ -67,12 +72,18 @@ def in_photo(
     moved = np.zeros(2) if shift is None else shift
 
     def points(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        plane = patch.plane((x + moved[0] + 0.5) / size.width - 0.5, (y + moved[1] + 0.5) / size.height - 0.5)
+        across, down = (x + moved[0] + 0.5) / size.width - 0.5, (y + moved[1] + 0.5) / size.height - 0.5
         h = placed.image_from_plane
-        mapped = plane @ h[:, :2].T + h[:, 2]
-        front = mapped[..., 2] > 1e-6 * abs(h[2, 2])
-        depth = np.where(front, mapped[..., 2], 1.0)
-        at_x, at_y = mapped[..., 0] / depth, mapped[..., 1] / depth
+        least = 1e-6 * abs(h[2, 2])
+        if patch.plane_from_patch is not None:
+            h = h @ patch.plane_from_patch
+            u, v, depth = (row[0] * across[None, :] + (row[1] * down[:, None] + row[2]) for row in h)
+        else:
+            plane = patch.plane(across, down)
+            u, v, depth = (row[0] * plane[..., 0] + (row[1] * plane[..., 1] + row[2]) for row in h)
+        front = depth > least
+        over = 1 / np.where(front, depth, 1.0)
+        at_x, at_y = u * over, v * over
         if k1:
             at_x, at_y, shown = bent(at_x, at_y, k1, placed.size)
             front = front & shown
@@ -94,21 +105,24 @@ def finest(placed: Placed, points: np.ndarray) -> float:
 
 def _lattice(placed: Placed, basis: np.ndarray, seen: np.ndarray) -> Patches:
     cell = supercell(basis)
-    cells_from_plane = np.linalg.inv(basis)
     low, high = placed.index.min(axis=0), placed.index.max(axis=0)
     table = np.zeros(high - low + 3, bool)
     table[tuple((placed.index - low + 1).T)] = True
 
-    def drawn(points: np.ndarray) -> np.ndarray:
-        index = np.rint((points - placed.origin) @ cells_from_plane).astype(int) - low + 1
-        index = np.clip(index, 0, np.array(table.shape) - 1)
-        return table[index[..., 0], index[..., 1]]
+    def drawn(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        found = []
+        for k in (0, 1):
+            steps = np.rint(x[None, :] * cell.steps[0, k] + y[:, None] * cell.steps[1, k]).astype(int)
+            found.append(np.clip(steps + patch.index[k] - low[k] + 1, 0, table.shape[k] - 1))
+        return table[found[0], found[1]]
 
     def piece(index: np.ndarray, center: np.ndarray) -> Patch:
         def plane(x: np.ndarray, y: np.ndarray) -> np.ndarray:
             return center + x[None, :, None] * cell.sides[0] + y[:, None, None] * cell.sides[1]
 
-        return Patch((int(index[0]), int(index[1])), center, plane)
+        plane_from_patch = np.eye(3)
+        plane_from_patch[:2] = np.column_stack([cell.sides[0], cell.sides[1], center])
+        return Patch((int(index[0]), int(index[1])), center, plane, plane_from_patch)
 
     pieces = [piece(placed.index[k], placed.points[k]) for k in _nearest_first(placed, seen)]
     return Patches(placed, tuple(pieces), np.linalg.norm(cell.sides, axis=1), cell, drawn)
@@ -153,8 +167,12 @@ def _rings(placed: Placed, seen: np.ndarray) -> Patches:
 
     chosen = seen & (sizes == size)
     pieces = [piece(placed.index[k]) for k in _nearest_first(placed, chosen)]
-    everywhere = lambda points: np.ones(points.shape[:-1], bool)  # noqa: E731  # a sector holds one object
-    return Patches(placed, tuple(pieces), np.array([width, height]), None, everywhere)
+    return Patches(placed, tuple(pieces), np.array([width, height]), None, _everywhere)
+
+
+def _everywhere(_patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A sector holds one object, and all of it is drawn."""
+    return np.ones((len(y), len(x)), bool)
 
 
 def _along(form: Polar, turn: int) -> float:

@@ -12,26 +12,29 @@ from p3i.size import Size
 class Seam:
     """Mean absolute differences (0 to 255) of neighbouring pixels: across the wrap, and inside the tile.
 
-    `across_*` [left to right, top to bottom] near `inside_*` is a seam that nobody sees; None where a
-    direction does not wrap.
+    `across_*` (x: left to right, y: top to bottom) near `inside_*` is a seam that nobody sees; None where a
+    direction does not wrap. `beside_*` are those next to the wrap on either side: where a line of the pattern
+    runs along the wrap they are large, too.
     """
 
     across_x: float
     inside_x: float
+    beside_x: float
     across_y: float | None
     inside_y: float | None
+    beside_y: float | None
 
     @property
     def ratio(self) -> float:
-        """The worse of the two directions, against the differences inside; 1 or less is no seam."""
-        found = [self.across_x / max(self.inside_x, 0.25)]
-        if self.across_y is not None and self.inside_y is not None:
-            found.append(self.across_y / max(self.inside_y, 0.25))
+        """The worse of the two directions, against the differences inside or beside it; 1 is no seam."""
+        found = [self.across_x / max(self.inside_x, self.beside_x, 0.25)]
+        if self.across_y is not None and self.inside_y is not None and self.beside_y is not None:
+            found.append(self.across_y / max(self.inside_y, self.beside_y, 0.25))
         return max(found)
 
     def record(self) -> dict[str, Any]:
         """As plain JSON values."""
-        names = ("across_x", "inside_x", "across_y", "inside_y")
+        names = ("across_x", "inside_x", "beside_x", "across_y", "inside_y", "beside_y")
         values = {name: getattr(self, name) for name in names} | {"ratio": self.ratio}
         return {name: None if value is None else round(value, 3) for name, value in values.items()}
 
@@ -45,29 +48,33 @@ class Seam:
 
 def seam_of(pixels: np.ndarray, known: np.ndarray, *, down: bool) -> Seam:
     """The seam of a tile [H, W, 3] in 0..1, where `known` [H, W]; `down` says whether it wraps downwards."""
-    across_x, inside_x = _differences(pixels, known)
+    x = _differences(pixels, known)
     if not down:
-        return Seam(across_x, inside_x, None, None)
-    across_y, inside_y = _differences(pixels.transpose(1, 0, 2), known.T)
-    return Seam(across_x, inside_x, across_y, inside_y)
+        return Seam(*x, None, None, None)
+    return Seam(*x, *_differences(pixels.transpose(1, 0, 2), known.T))
 
 
-def wrapped(pixels: np.ndarray, size: Size) -> np.ndarray:
-    """A tile [H, W, 3] of `size` from a larger piece: what lies beyond the far sides is blended over the near.
+def wrapped(pixels: np.ndarray, known: np.ndarray, size: Size) -> tuple[np.ndarray, np.ndarray]:
+    """A tile [H, W, 3] of `size`, and what of it is known, from a larger piece.
 
-    `pixels` [H + a, W + b, 3] holds a rows and b columns more, none perhaps.
+    `pixels` [H + a, W + b, 3] and `known` hold a rows and b columns more, none perhaps: what lies beyond the
+    far sides is blended into the near sides, which it continues.
     """
-    extra = pixels.shape[1] - size.width
-    found = pixels[:, : size.width].copy()
+    found, seen = _folded(pixels, known, size.width)
+    found, seen = _folded(found.transpose(1, 0, 2), seen.T, size.height)
+    return np.ascontiguousarray(found.transpose(1, 0, 2)), np.ascontiguousarray(seen.T)
+
+
+def _folded(pixels: np.ndarray, known: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first `width` columns, with those beyond blended over the first."""
+    extra = pixels.shape[1] - width
+    found, seen = pixels[:, :width].copy(), known[:, :width].copy()
     if extra:
-        share = _ramp(extra)[None, :, None]
-        found[:, :extra] = share * found[:, :extra] + (1 - share) * pixels[:, size.width :]
-    extra = pixels.shape[0] - size.height
-    rows = found[: size.height].copy()
-    if extra:
-        share = _ramp(extra)[:, None, None]
-        rows[:extra] = share * rows[:extra] + (1 - share) * found[size.height :]
-    return rows
+        own, other = seen[:, :extra], known[:, width:]
+        share = np.where(own & other, _ramp(extra)[None, :], own.astype(np.float32))[:, :, None]
+        found[:, :extra] = share * found[:, :extra] + (1 - share) * pixels[:, width:]
+        seen[:, :extra] = own | other
+    return found, seen
 
 
 def _ramp(count: int) -> np.ndarray:
@@ -76,8 +83,15 @@ def _ramp(count: int) -> np.ndarray:
     return at * at * (3 - 2 * at)
 
 
-def _differences(pixels: np.ndarray, known: np.ndarray) -> tuple[float, float]:
-    """Mean differences (0 to 255) of the last column to the first, and of neighbouring columns."""
-    across = np.abs(pixels[:, -1] - pixels[:, 0])[known[:, -1] & known[:, 0]]
-    inside = np.abs(np.diff(pixels, axis=1))[known[:, 1:] & known[:, :-1]]
-    return tuple(255 * float(found.mean()) if found.size else 0.0 for found in (across, inside))  # pyright: ignore
+def _differences(pixels: np.ndarray, known: np.ndarray) -> tuple[float, float, float]:
+    """Mean differences (0 to 255): of the last column to the first, of neighbours, of those by the wrap."""
+    steps = np.abs(np.diff(pixels, axis=1)).mean(axis=2)
+    both = known[:, 1:] & known[:, :-1]
+    across = np.abs(pixels[:, -1] - pixels[:, 0]).mean(axis=1)[known[:, -1] & known[:, 0]]
+    ends = [0, 1, -2, -1]
+    beside = [_mean(steps[:, end][both[:, end]]) for end in ends if steps.shape[1] >= 4]
+    return _mean(across), _mean(steps[both]), max(beside, default=0.0)
+
+
+def _mean(values: np.ndarray) -> float:
+    return 255 * float(values.mean()) if values.size else 0.0

@@ -1,9 +1,9 @@
 """A straightened view before it is painted: which way up, how large, and how its pixels lie in the photo.
 
 Convention: arrays of float64; matrices are named target_from_source; pixel centres at whole numbers.
-*Upright* units are the plane's after the turn (and, where a cell's true size is known, the affine map that makes
-it metric): program units, or millimetres. `pinhole` pixels are the photo's after its lens is straightened; they
-are the photo's own where the program's header names no lens_k1.
+*Upright* units are the plane's after the turn (and, where a cell's true size is known, the affine map that
+makes it metric): program units, or millimetres. `pinhole` pixels are the photo's after its lens is
+straightened; they are the photo's own where the program's header names no lens_k1.
 """
 
 import math
@@ -23,7 +23,7 @@ _SKEW_SNAP = 0.12
 """A row's shift against the next, in cells, that counts as none or as half a cell."""
 
 _RIGHT_DEG = 4.0
-"""Directions that are this near to a right angle count as standing at one: an assumed focal skews by as much."""
+"""Directions that are this near to a right angle count as at one: an assumed focal skews by as much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,20 +127,26 @@ def _metric(basis: np.ndarray, cell: CellSize) -> np.ndarray:
 
 
 def _off_axis_rad(basis: np.ndarray) -> float:
-    """The least angle by which a view must turn back for the lattice to stand straight in it.
+    """The least angle that a view must turn back for the lattice to stand straight in it.
 
-    A lattice has a pair of directions at right angles, u and v or (where they are as long as each other, as on a
-    chessboard) u + v and u - v, or both; one with none stands on u or v.
+    That is: u across (or v, where u is more than 45 degrees off), or a pair of directions at right angles
+    along both axes; u + v and u - v are one where u and v are as long as each other, as on a chessboard.
     """
     u, v = basis
-    pairs = [(first, second) for first, second in ((u, v), (u + v, u - v)) if _square(first, second)]
-    angles = [math.atan2(vector[1], vector[0]) for pair in pairs or [(u, v)] for vector in pair]
-    # Of a right angle either side may lie across; an eighth of a degree keeps equal choices apart.
-    turns = [math.remainder(angle, math.pi / 2 if pairs else math.pi) for angle in angles]
-    if not pairs:
-        turns += [math.remainder(angle - math.pi / 2, math.pi) for angle in angles]
+    across = [math.remainder(_angle_rad(vector), math.pi) for vector in (u, v)]
+    turns = [min(across, key=abs) if abs(across[0]) > math.pi / 4 else across[0]]
+    turns += [
+        math.remainder(_angle_rad(first), math.pi / 2)
+        for first, second in ((u, v), (u + v, u - v))
+        if _square(first, second)
+    ]
+    # Equal choices should not hang on rounding: the first of those that are nearly the least.
     least = min(abs(turn) for turn in turns)
-    return next(turn for turn in turns if abs(turn) <= least + math.radians(0.125))
+    return next(turn for turn in turns if abs(turn) <= least + math.radians(0.01))
+
+
+def _angle_rad(vector: np.ndarray) -> float:
+    return math.atan2(vector[1], vector[0])
 
 
 def _square(first: np.ndarray, second: np.ndarray) -> bool:

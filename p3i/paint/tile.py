@@ -1,5 +1,6 @@
 """A seamless texture of a pattern's cell: the robust mean of its cells, or the best of them."""
 
+import dataclasses
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -35,7 +36,7 @@ _MOST_SHIFT = 0.08
 """Cells that lie off their place by more than this share of a side are not moved onto it."""
 
 _OVERLAP = 0.16
-"""The share of the best cell's sides over which it is blended into what follows on the other side."""
+"""The share of a tile's sides over which it is blended into what follows on the other side."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,20 +104,22 @@ def tile(photo: Image, program: Program, options: TileOptions | None = None, **c
     size = options.size or _size(patches)
     whole = Size(size.width * options.repeat[0], size.height * options.repeat[1])
     refuse_huge(whole, max_px=options.max_px)
-    stack = _stack(photo, patches, size, k1=k1)
+    larger = _larger(size, down=patches.cell is not None)
+    stack = _stack(photo, patches, size, larger, k1=k1)
     light = even(np.zeros(2))
     if options.light:
-        light = _light(stack, size)
-        stack = _lit(stack, size, light)
-    mean, known = robust_mean(stack.values, stack.seen)
-    stack = _registered(stack, photo, mean, size=size, k1=k1, light=light)
-    mean, known = robust_mean(stack.values, stack.seen)
+        light = _light(stack)
+        stack = _lit(stack, light)
+    mean, _ = robust_mean(stack.values, stack.seen)
+    stack = _registered(stack, photo, mean, k1=k1, light=light)
+    mean, seen = robust_mean(stack.values, stack.seen)
     used = tuple(patch.index for patch in stack.pieces)
     notes = list(photo.notes)
-    pixels = mean
+    pixels, known = wrapped(mean, seen, size)
     if options.source == "best":
-        best = _best(stack, mean)
-        pixels = _blended(photo, stack, best, mean, size=size, k1=k1, light=light)
+        best = _best(stack, mean, size)
+        own = np.where(stack.seen[best][:, :, None], stack.values[best] / np.float32(65535), mean)
+        pixels, known = wrapped(own, seen, size)
         used = (stack.pieces[best].index,)
     cell = patches.cell
     if cell is not None and not cell.rectangular:
@@ -144,13 +147,26 @@ def tile(photo: Image, program: Program, options: TileOptions | None = None, **c
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stack:
-    """Patches as arrays: `values` uint16 [K, H, W, 3], `seen` [K, H, W]; `shifts` [K, 2] in pixels."""
+    """Patches as arrays: `values` uint16 [K, H, W, 3], `seen` [K, H, W].
+
+    A tile is of `size`; the arrays go on beyond its right and lower side, for what is blended there.
+    """
 
     patches: Patches
     pieces: tuple[Patch, ...]
     values: np.ndarray
     seen: np.ndarray
-    shifts: np.ndarray
+    size: Size
+
+    @property
+    def larger(self) -> Size:
+        """The canvas of the arrays."""
+        return Size(self.seen.shape[2], self.seen.shape[1])
+
+    @property
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """The pixel centres of a patch: x [W], y [H]; the tile itself runs from -0.5 to 0.5."""
+        return _places(self.size, self.larger)
 
 
 def _size(patches: Patches) -> Size:
@@ -161,31 +177,42 @@ def _size(patches: Patches) -> Size:
     return Size(int(width), int(height))
 
 
+def _larger(size: Size, *, down: bool) -> Size:
+    """The canvas of the patches: a tile and what is blended into its other side."""
+    across, below = (max(2, round(_OVERLAP * side)) for side in (size.width, size.height))
+    return Size(size.width + across, size.height + (below if down else 0))
+
+
 def _sampled(
-    photo: Image, patches: Patches, piece: Patch, size: Size, *, k1: float | None, shift: np.ndarray
+    photo: Image,
+    patches: Patches,
+    piece: Patch,
+    size: Size,
+    larger: Size,
+    *,
+    k1: float | None,
+    shift: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """One patch: uint16 [H, W, 3], and what of it the photo knows and the program draws."""
     points = in_photo(patches.placed, piece, size, k1=k1, shift=shift)
-    values, alpha = resample(photo.pixels, opacity(photo), points, size=size, bits=16)
-    drawn = patches.drawn(piece.plane(*_places(size)))
+    values, alpha = resample(photo.pixels, opacity(photo), points, size=larger, bits=16)
+    drawn = patches.drawn(piece, *_places(size, larger))
     return values, drawn if alpha is None else drawn & (alpha >= 0x8000)
 
 
-def _places(size: Size) -> tuple[np.ndarray, np.ndarray]:
-    """The pixel centres of a patch in -0.5..0.5: x [w], y [h]."""
-    return (np.arange(size.width) + 0.5) / size.width - 0.5, (
-        np.arange(size.height) + 0.5
-    ) / size.height - 0.5
+def _places(size: Size, larger: Size) -> tuple[np.ndarray, np.ndarray]:
+    across = (np.arange(larger.width) + 0.5) / size.width - 0.5
+    return across, (np.arange(larger.height) + 0.5) / size.height - 0.5
 
 
-def _stack(photo: Image, patches: Patches, size: Size, *, k1: float | None) -> _Stack:
-    most = int(np.clip(_MOST_SAMPLES // (size.width * size.height), 1, _MOST_PATCHES))
+def _stack(photo: Image, patches: Patches, size: Size, larger: Size, *, k1: float | None) -> _Stack:
+    most = int(np.clip(_MOST_SAMPLES // (larger.width * larger.height), 1, _MOST_PATCHES))
     pieces: list[Patch] = []
     values: list[np.ndarray] = []
     seen: list[np.ndarray] = []
     for piece in patches.pieces:
-        found, known = _sampled(photo, patches, piece, size, k1=k1, shift=np.zeros(2))
-        if known.mean() >= _LEAST_SEEN:
+        found, known = _sampled(photo, patches, piece, size, larger, k1=k1)
+        if known[: size.height, : size.width].mean() >= _LEAST_SEEN:
             pieces.append(piece)
             values.append(found)
             seen.append(known)
@@ -193,13 +220,17 @@ def _stack(photo: Image, patches: Patches, size: Size, *, k1: float | None) -> _
             break
     if not pieces:
         raise ProgramError("no cell of the pattern is seen well enough to make a tile of")
-    return _Stack(patches, tuple(pieces), np.stack(values), np.stack(seen), np.zeros((len(pieces), 2)))
+    return _Stack(patches, tuple(pieces), np.stack(values), np.stack(seen), size)
 
 
-def _light(stack: _Stack, size: Size) -> Light:
+def _light(stack: _Stack) -> Light:
     """The light over the cells, from a few hundred places of each, averaged around."""
-    side = Size(min(_LIGHT_SIDE, size.width), min(_LIGHT_SIDE, size.height))
-    x, y = _places(side)
+    larger = stack.larger
+    side = Size(min(_LIGHT_SIDE, larger.width), min(_LIGHT_SIDE, larger.height))
+    # The small canvas covers the large one: its pixels are as much larger as they are fewer.
+    share = larger.width / stack.size.width, larger.height / stack.size.height
+    x = (np.arange(side.width) + 0.5) / side.width * share[0] - 0.5
+    y = (np.arange(side.height) + 0.5) / side.height * share[1] - 0.5
     small = (side.width, side.height)
     values = [cv2.resize(value, small, interpolation=cv2.INTER_AREA) for value in stack.values]
     seen = [
@@ -215,19 +246,18 @@ def _light(stack: _Stack, size: Size) -> Light:
     )
 
 
-def _lit(stack: _Stack, size: Size, light: Light) -> _Stack:
+def _lit(stack: _Stack, light: Light) -> _Stack:
     """The stack in even light."""
-    values = np.stack(
-        [_relit(value, piece, size, light) for value, piece in zip(stack.values, stack.pieces, strict=True)]
-    )
-    return _Stack(stack.patches, stack.pieces, values, stack.seen, stack.shifts)
+    pairs = zip(stack.values, stack.pieces, strict=True)
+    values = np.stack([_relit(value, piece.plane(*stack.places), light) for value, piece in pairs])
+    return dataclasses.replace(stack, values=values)
 
 
-def _relit(value: np.ndarray, piece: Patch, size: Size, light: Light) -> np.ndarray:
+def _relit(value: np.ndarray, plane: np.ndarray, light: Light) -> np.ndarray:
     if not len(light.terms):
         return value
-    gain = light.gain(piece.plane(*_places(size)))
-    return np.rint(np.clip(value / gain, 0, 65535)).astype(np.uint16)
+    gain = light.gain(plane.astype(np.float32))
+    return np.clip(value / gain + np.float32(0.5), 0, 65535).astype(np.uint16)
 
 
 def robust_mean(values: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -237,52 +267,56 @@ def robust_mean(values: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.nd
     """
     count, height, width, _ = values.shape
     mean = np.zeros((height, width, 3), np.float32)
-    rows = max(1, 2_000_000 // (count * width * 3))
+    rows = max(1, 1_000_000 // (count * width * 3))
     for first in range(0, height, rows):
         part = slice(first, first + rows)
-        block = values[:, part].astype(np.float32) / 65535
-        known = seen[:, part]
-        block[~known] = np.nan
-        lone = ~known.any(axis=0)
-        block[:, lone] = 0
-        middle = np.nanmedian(block, axis=0)
-        apart = np.abs(block - middle).mean(axis=3)
-        typical = np.nanmedian(apart, axis=0)
-        near = np.nan_to_num(apart, nan=np.inf) <= 2.5 * typical + 1 / 512
-        share = near / np.maximum(near.sum(axis=0), 1)
-        mean[part] = (np.nan_to_num(block) * share[:, :, :, None]).sum(axis=0)
+        # Patches last: sorting and summing run along memory.
+        block = np.ascontiguousarray(np.moveaxis(values[:, part], 0, -1))
+        known = np.ascontiguousarray(np.moveaxis(seen[:, part], 0, -1))
+        middle = _median(block, known[:, :, None, :])
+        apart = np.abs(block.astype(np.int32) - middle[..., None]).sum(axis=2) // 3
+        typical = _median(apart.astype(np.uint16), known)
+        near = known & (apart <= 2.5 * typical[..., None] + 128)
+        total = np.einsum("hwck,hwk->hwc", block.astype(np.float32), near.astype(np.float32))
+        mean[part] = total / (65535 * np.maximum(near.sum(axis=-1), 1)[:, :, None])
     return mean, seen.any(axis=0)
 
 
-def _registered(
-    stack: _Stack, photo: Image, mean: np.ndarray, *, size: Size, k1: float | None, light: Light
-) -> _Stack:
+def _median(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """The (lower) median of uint16 [..., K] over the known; 65535 where nothing is."""
+    ordered = np.sort(np.where(known, values, np.uint16(65535)), axis=-1)
+    at = np.maximum(np.broadcast_to(known, values.shape).sum(axis=-1) - 1, 0) // 2
+    return np.take_along_axis(ordered, at[..., None], axis=-1)[..., 0].astype(np.int32)
+
+
+def _registered(stack: _Stack, photo: Image, mean: np.ndarray, *, k1: float | None, light: Light) -> _Stack:
     """The stack with cells that lie a little off moved onto the mean, where that makes them more alike."""
+    size, larger = stack.size, stack.larger
     if min(size.width, size.height) < 16 or len(stack.pieces) < 3:
         return stack
-    window = cv2.createHanningWindow((size.width, size.height), cv2.CV_32F)
+    window = cv2.createHanningWindow((larger.width, larger.height), cv2.CV_32F)
     grey = np.ascontiguousarray(mean.mean(axis=2))
-    values, seen, shifts = stack.values.copy(), stack.seen.copy(), stack.shifts.copy()
+    values, seen = stack.values.copy(), stack.seen.copy()
     for k, piece in enumerate(stack.pieces):
         here = np.where(seen[k][:, :, None], values[k] / np.float32(65535), mean)
         (x, y), _ = cv2.phaseCorrelate(grey, np.ascontiguousarray(here.mean(axis=2), np.float32), window)
         shift = np.array([x, y])
         if (np.abs(shift) > _MOST_SHIFT * np.array([size.width, size.height])).any() or np.hypot(x, y) < 0.05:
             continue
-        moved, known = _sampled(photo, stack.patches, piece, size, k1=k1, shift=shift)
-        moved = _relit(moved, piece, size, light)
+        moved, known = _sampled(photo, stack.patches, piece, size, larger, k1=k1, shift=shift)
+        moved = _relit(moved, piece.plane(*stack.places), light)
         both = known & seen[k]
         if both.mean() < 0.5 * seen[k].mean():
             continue
         before = np.abs(values[k][both] / np.float32(65535) - mean[both]).mean()
         if np.abs(moved[both] / np.float32(65535) - mean[both]).mean() < 0.98 * before:
-            values[k], seen[k], shifts[k] = moved, known, shift
-    return _Stack(stack.patches, stack.pieces, values, seen, shifts)
+            values[k], seen[k] = moved, known
+    return dataclasses.replace(stack, values=values, seen=seen)
 
 
-def _best(stack: _Stack, mean: np.ndarray) -> int:
+def _best(stack: _Stack, mean: np.ndarray, size: Size) -> int:
     """The sharpest of the cells that are wholly seen and nearly as like the mean as any."""
-    whole = stack.seen.mean(axis=(1, 2))
+    whole = stack.seen[:, : size.height, : size.width].mean(axis=(1, 2))
     candidates = np.flatnonzero(whole >= min(0.999, float(whole.max())))
     apart, sharp = [], []
     for k in candidates:
@@ -293,36 +327,3 @@ def _best(stack: _Stack, mean: np.ndarray) -> int:
     limit = 1.25 * min(apart) + 1e-9
     good = [k for k in range(len(candidates)) if apart[k] <= limit]
     return int(candidates[max(good, key=lambda k: sharp[k])])
-
-
-def _blended(
-    photo: Image,
-    stack: _Stack,
-    best: int,
-    mean: np.ndarray,
-    *,
-    size: Size,
-    k1: float | None,
-    light: Light,
-) -> np.ndarray:
-    """The best cell [H, W, 3] in 0..1, its first rows and columns blended into what follows its last."""
-    over = [max(2, round(_OVERLAP * side)) for side in (size.width, size.height)]
-    piece, shift = stack.pieces[best], stack.shifts[best]
-    down = stack.patches.cell is not None
-    larger = Size(size.width + over[0], size.height + (over[1] if down else 0))
-    # The same piece on a larger canvas: its pixels go on beyond the sides.
-    x = (np.arange(larger.width) + 0.5) / size.width - 0.5
-    y = (np.arange(larger.height) + 0.5) / size.height - 0.5
-    points = in_photo(stack.patches.placed, piece, size, k1=k1, shift=shift)
-    values, alpha = resample(photo.pixels, opacity(photo), points, size=larger, bits=16)
-    known = np.ones(values.shape[:2], bool) if alpha is None else alpha >= 0x8000
-    plane = piece.plane(x, y)
-    known &= stack.patches.drawn(plane)
-    found = values / np.float32(65535)
-    if len(light.terms):
-        found = found / light.gain(plane)
-    repeated = np.pad(
-        mean, ((0, larger.height - size.height), (0, larger.width - size.width), (0, 0)), "wrap"
-    )
-    found = np.where(known[:, :, None], np.clip(found, 0, 1), repeated)
-    return wrapped(found.astype(np.float32), size)

@@ -82,7 +82,8 @@ def decode(data: bytes, *, name: str, max_px: int) -> Decoded:
 def swap_red_blue(array: np.ndarray) -> np.ndarray:
     """BGR(A) to RGB(A) and back: the one place where OpenCV's channel order is turned. [H, W, 3 or 4]."""
     order = (2, 1, 0, 3) if array.shape[2] == 4 else (2, 1, 0)
-    return np.ascontiguousarray(array[:, :, order])
+    planes = cv2.split(array)  # several times faster than indexing on large pictures
+    return np.asarray(cv2.merge([planes[channel] for channel in order]))
 
 
 def _decode(data: bytes, *, name: str, max_px: int) -> Decoded:

@@ -66,8 +66,10 @@ def resample(
             waiting += _quarters(rows, columns)
             continue
         colour, seen = _tile(source, points, rows, columns, samples=samples, halvings=halvings)
-        values[rows, columns] = np.rint(colour * top)
-        opacity[rows, columns] = np.rint(seen * top)
+        values[rows, columns] = colour * np.float32(top) + np.float32(
+            0.5
+        )  # to the nearest, as all is positive
+        opacity[rows, columns] = seen * np.float32(top) + np.float32(0.5)
     return values, None if (opacity == top).all() else opacity
 
 
@@ -128,12 +130,15 @@ def _tile(
     """One tile: colours [h, w, 3] and alpha [h, w] in 0..1."""
     width, height = columns.stop - columns.start, rows.stop - rows.start
     reduce = 2**halvings
-    centres_x, centres_y = np.arange(columns.start, columns.stop), np.arange(rows.start, rows.stop)
-    _, _, known = points(centres_x.astype(float), centres_y.astype(float))
+    centres = (
+        np.arange(columns.start, columns.stop, dtype=float),
+        np.arange(rows.start, rows.stop, dtype=float),
+    )
+    x, y = _finer(columns.start, width, samples[0]), _finer(rows.start, height, samples[1])
+    at_x, at_y, known_finer = points(x, y)
+    known = known_finer if samples == (1, 1) else points(*centres)[2]
     if not known.any():
         return np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
-    x, y = _finer(columns.start, width, samples[0]), _finer(rows.start, height, samples[1])
-    at_x, at_y, _ = points(x, y)
     if halvings:
         at_x, at_y = (at_x + 0.5) / reduce - 0.5, (at_y + 0.5) / reduce - 0.5
     # Beyond any picture; keeps what lies behind the camera from overflowing.
@@ -150,7 +155,9 @@ def _tile(
         covered = np.clip(found[:, :, 3], 0, 1)
         found = found[:, :, :3] / np.maximum(covered, 1 / 512)[:, :, None]
         opacity = opacity * covered
-    return np.clip(found, 0, 1) * (opacity > 0)[:, :, None], opacity
+    if not known.all() or source.shape[2] == 4:
+        found = found * (opacity > 0)[:, :, None]
+    return np.clip(found, 0, 1), opacity
 
 
 def _reach(count: int) -> int:
