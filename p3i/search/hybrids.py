@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from p3i.grammar.leaves import leaves, with_leaves
+from p3i.search.choose import explained_bits
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, filling_of
 from p3i.search.patches import spacing
@@ -36,6 +38,7 @@ _MOST_GROWTHS = 4
 # lie close to a rim.
 _CLOSE_LOOK = 0.6
 _MOST_TOLD = 2
+_FEWEST_RINGS = 2
 
 
 def find_hybrids(session: Session) -> list[Answer]:
@@ -60,7 +63,26 @@ def find_hybrids(session: Session) -> list[Answer]:
             score = max(curve_score(fit), ring.score * min(1.0, fit.quality / ring.fit.quality))
             found.append((fit.mean * len(fit.contrast), score, fit))
     found.sort(key=lambda triple: -triple[0])
-    return [answer_of(session, fit, "hybrid", score) for _, score, fit in found[:_MOST_TOLD]]
+    answers = [answer_of(session, fit, "hybrid", score) for _, score, fit in found[:_MOST_TOLD]]
+    return [_without_empty_middle(session, answer) for answer in answers]
+
+
+def _without_empty_middle(session: Session, answer: Answer) -> Answer:
+    """The answer without its first rings as long as it explains more of the photo so.
+
+    A first ring close to the centre has room for tiny patches only: where nothing is there, all lose by it.
+    """
+    bits = explained_bits(session.evidence, answer)
+    while True:
+        numbers = leaves(answer.program)
+        first, stop = numbers["for_i.start.1"], numbers["for_i.stop.1"]
+        if stop - first <= _FEWEST_RINGS:
+            return answer
+        later = replace(answer, program=with_leaves(answer.program, {"for_i.start.1": first + 1}))
+        more = explained_bits(session.evidence, later)
+        if more <= bits:
+            return answer
+        bits, answer = more, later
 
 
 def _fits(session: Session, ring: CurveFit, proposals: list[HybridProposal]) -> list[CurveFit]:

@@ -12,13 +12,19 @@ from drawn import DrawnRing
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.scene import Scene, on_canvas
 from p3i.grammar.ast import Affine, Polar
-from p3i.grammar.leaves import leaves
+from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.evidence import Evidence
-from p3i.search.hybrids import _drawn_once, _evenly_sure, find_hybrids, hybrid_filling
+from p3i.search.hybrids import (
+    _drawn_once,
+    _evenly_sure,
+    _without_empty_middle,
+    find_hybrids,
+    hybrid_filling,
+)
 from p3i.search.propose.hybrid import HybridProposal
 from p3i.search.result import NEEDED
 from p3i.search.rings import FoundRing, numbers_of, ring_filling
@@ -131,6 +137,20 @@ def test_a_ring_laid_over_its_own_objects_makes_no_hybrid(step: float, once: boo
     z = numbers_of(filling, values | {"draw.x.radius.1": 24.0, "draw.x.offset.i": step})
     index = filling.pattern.index.double()
     assert _drawn_once(CurveFit(filling, z, 35.0, 24.0, index, torch.ones(len(index)))) == once
+
+
+def test_an_empty_ring_about_the_centre_is_left_out_and_one_with_objects_stays() -> None:
+    scene = hybrid_scene(SCENES["concentric"], kind="concentric")
+    session = Session(Evidence(scene.image(), SearchConfig(focal_mm=35.0), 35.0), SearchConfig(focal_mm=35.0))
+    whole = Answer(replace(scene.program, header=None), "hybrid", 0.5, 0.5)
+    assert _without_empty_middle(session, whole) == whole
+    value = leaves(whole.program)
+    assert value["for_i.start.1"] == 0
+    # Rings of half the growth: one nearer to the centre, and one between each two.
+    halved = {f"draw.{axis}.radius.i": value["draw.x.radius.i"] / 2 for axis in "xy"}
+    program = with_leaves(whole.program, halved | {"for_i.start.1": -1.0, "for_i.stop.1": 2.0})
+    found = _without_empty_middle(session, replace(whole, program=program))
+    assert leaves(found.program)["for_i.start.1"] == 0
 
 
 def test_a_fan_is_written_with_a_count_that_grows_with_i() -> None:
