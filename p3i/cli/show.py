@@ -37,7 +37,9 @@ from p3i.paint.show_options import KINDS, LABELS, ShowOptions, default, kind_of,
 @click.option("--horizon/--no-horizon", default=default("horizon"), help=sentence("horizon"))
 @click.option("--extent/--no-extent", default=default("extent"), help=sentence("extent"))
 @click.option("--presence/--no-presence", default=default("presence"), help=sentence("presence"))
-@click.option("--longer", type=int, metavar="N", help=sentence("longer"))
+@click.option(
+    "--longer", type=int, metavar="N", default=default("longer"), show_default=True, help=sentence("longer")
+)
 @click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @options.quiet
 @options.error_format

@@ -25,6 +25,15 @@ def clipped_to_canvas(polygon: np.ndarray, size: Size) -> np.ndarray:
     return polygon if len(polygon) >= 3 and area(polygon) > 1e-6 else np.zeros((0, 2))
 
 
+def without_straight_corners(polygon: np.ndarray) -> np.ndarray:
+    """The polygon [K, 2] without the corners at which it does not turn."""
+    before, after = polygon - np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0) - polygon
+    turn = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    turning = turn > 1e-9 * lengths
+    return polygon[turning] if turning.sum() >= 3 else polygon
+
+
 def area(polygon: np.ndarray) -> float:
     """The area of a polygon [K, 2], 0 for fewer than three corners."""
     x, y = np.asarray(polygon, float).reshape(-1, 2).T

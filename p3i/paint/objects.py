@@ -17,7 +17,7 @@ from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.interp.camera import Camera
 from p3i.paint import outlines
-from p3i.paint.clip import clipped_to_canvas, cut_before_camera
+from p3i.paint.clip import clipped_to_canvas, cut_before_camera, without_straight_corners
 from p3i.paint.lens import bent_points
 from p3i.paint.naming import Arrangement, Naming, named
 from p3i.paint.placed import Placed, placed, straight
@@ -186,6 +186,7 @@ def objects_of(
     for place, score, cell, left_out in zip(kept.tolist(), presence, cells, faint, strict=True):
         if left_out:
             continue
+        cell = without_straight_corners(cell)
         cell_px = cell_on_photo(laid, cell, k1)
         if options.clip:
             cell_px = clipped_to_canvas(cell_px, laid.size)

@@ -27,11 +27,15 @@ _SAMPLES = 3_000_000
 """Of a sheet, at most about this many."""
 _FEWEST = 3
 """With fewer objects than this there is no telling what is common to them."""
-_LEAST_KNOWN = 0.35
-"""The share of a cell that must be known for its object to be judged."""
+_LEAST_KNOWN = 0.5
+"""The share of a cell, its middle before its border, that must be known for its object to be judged."""
 _SLACK = 0.09
 """Of a step: how far an object may lie from its place."""
 _ROUNDS = 8
+_MIDDLE, _BORDER = 0.25, 0.3
+"""A cell counts fully up to this far from its middle, in steps, and by this much at its border."""
+_LEAST_LEAD = 0.05
+"""A typical lead below this is noise: then no object stands out enough to be there."""
 _DIVIDE, _SLOPE = 0.5, 10.0
 """A typical object's lead over half a step away is 1; at `_DIVIDE` of it the score is 0.5."""
 
@@ -52,13 +56,13 @@ def presence_of(placed: Placed, photo: Image, index: np.ndarray) -> Array:
     cells, seen = cut(features, sheet.side), cut(known, sheet.side)
     place = _position(chart, sheet.box, index)
     cells, seen = cells[place], seen[place]
-    visible = seen.mean(axis=(1, 2))
+    visible = (seen * _window(sheet.side)).mean(axis=(1, 2)) / _window(sheet.side).mean()
     judged = visible >= _LEAST_KNOWN
     if judged.sum() < _FEWEST:
         return unknown
     lead = _lead(cells, seen, judged, both=len(chart.directions) == 2)
-    typical = _typical(lead[judged])
-    score = 1 / (1 + np.exp(-_SLOPE * (lead / max(typical, 0.05) - _DIVIDE)))
+    scaled = lead / max(_typical(lead[judged]), _LEAST_LEAD)
+    score = 1 / (1 + np.exp(-_SLOPE * (scaled - _DIVIDE)))
     return np.where(judged, score, np.nan)
 
 
@@ -131,9 +135,20 @@ def _lead(cells: Floats, seen: Mask, judged: Mask, *, both: bool) -> Array:
     slack, half = max(1, round(_SLACK * side)), side // 2
     near = np.array([(x, y) for x in (-slack, 0, slack) for y in (-slack, 0, slack)])
     away = np.array([(half, 0), (0, half), (half, half)] if both else [(half, 0)])
-    here = agreement(cells, seen, shifted(template, near)).max(axis=1)
-    there = agreement(cells, seen, shifted(template, away)).max(axis=1)
+    window = np.sqrt(_window(side))
+    here, there = (
+        agreement(cells * window, seen, shifted(template, shifts) * window).max(axis=1)
+        for shifts in (near, away)
+    )
     return (here - np.maximum(there, 0)).astype(float)
+
+
+def _window(side: int) -> Floats:
+    """The weight of each sample of a cell [side, side]: neighbours reach into its border."""
+    line = (np.arange(side) + 0.5) / side - 0.5
+    falls = 0.5 + 0.5 * np.cos(np.clip((np.abs(line) - _MIDDLE) / (0.5 - _MIDDLE), 0, 1) * np.pi)
+    across = _BORDER + (1 - _BORDER) * falls
+    return (across[:, None] * across).astype(np.float32)
 
 
 def _common_cell(cells: Floats, seen: Mask, judged: Mask) -> Floats:

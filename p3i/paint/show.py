@@ -20,7 +20,7 @@ from p3i.paint.options import RenderOptions
 from p3i.paint.show_options import ShowOptions
 from p3i.paint.view import View, camera_view
 from p3i.size import Size
-from p3i.vision.image import Image
+from p3i.vision.image import Image, resized
 
 _DOT_SHARE = 0.1
 """A dot's radius as a share of the spacing."""
@@ -31,6 +31,8 @@ _SMALLEST, _LARGEST = 1 / 80, 1 / 24
 _LEAST_PX = 9.0
 _LETTER = 0.6
 """The width of a letter as a share of its size."""
+_CLEAR = 0.4
+"""Around each label this share of its size stays free on every side, or labels would carpet the photo."""
 _STRIDES = (10, 5, 2, 1)
 """Where not all labels have room, every tenth row and column goes first, then every fifth, every second."""
 
@@ -48,11 +50,11 @@ def show(
     program that draws nothing in front of its camera.
     """
     options = _changed(options or ShowOptions(), changes)
+    photo = resized(photo, options.longer)
     focal_mm = _focal(photo, program, options)
     judged = photo if options.presence else None
     found = objects_of(program, judged, size=photo.size, focal_mm=focal_mm)
     below = RenderOptions(
-        size=_size(photo.size, options.longer),
         markers=False,
         cells=options.cells,
         horizon=options.horizon,
@@ -87,8 +89,11 @@ def _layers(found: Objects, view: View, options: ShowOptions) -> list[scene.Laye
 
 
 def _marks(found: Objects, view: View, chart: outlines.Chart) -> list[scene.Layer]:
-    """Dots on the objects that are there, crosses where one is missed."""
-    there = [each for each in found.objects if each.presence is None or each.presence >= THERE]
+    """Dots on objects that are there, small grey ones where nobody can tell, crosses where one is missed."""
+    there = [each for each in found.objects if each.presence is not None and each.presence >= THERE]
+    unsure = [each for each in found.objects if each.presence is None]
+    if not found.judged:
+        there, unsure = unsure, []
     absent = [each for each in found.objects if each.presence is not None and each.presence < THERE]
     parts = nest(found.program)
     loops = (parts.for_i is not None) + (parts.for_j is not None)
@@ -99,6 +104,9 @@ def _marks(found: Objects, view: View, chart: outlines.Chart) -> list[scene.Laye
             view, _points(there), radius=radius, colours=scene.colours_of(index, loops=loops), light_rim=True
         )
     ]
+    if unsure:
+        grey = np.full((len(unsure), 3), 128, np.uint8)
+        layers.append(scene.dots(view, _points(unsure), radius=radius / 2, colours=grey, light_rim=True))
     if absent:
         arms = radius * np.array([[(-1, -1), (1, 1)], [(-1, 1), (1, -1)]])
         crosses = (_points(absent)[:, None, None] + arms).reshape(-1, 2, 2)
@@ -134,7 +142,7 @@ def _labels(found: Objects, view: View, *, names: bool, dots: bool) -> scene.Lab
         # Clear of the dot, which is about a tenth of the cell.
         anchors = anchors - np.stack([np.zeros(len(sizes)), 0.55 * sizes + 0.16 * cell_heights], axis=1)
     widths = _LETTER * sizes * np.array([len(text) for text in texts])
-    halves = np.stack([widths, sizes], axis=1) / 2 + sizes[:, None] * 0.15
+    halves = np.stack([widths, sizes], axis=1) / 2 + sizes[:, None] * _CLEAR
     kept = _with_room(anchors, halves, _priority(found.objects), view.size)
     return scene.Labels(tuple(texts[place] for place in kept), anchors[kept], sizes[kept])
 
@@ -181,13 +189,6 @@ def _height(view: View, each: Object) -> float:
 
 def _points(objects: tuple[Object, ...] | list[Object]) -> np.ndarray:
     return np.array([(each.x, each.y) for each in objects], float).reshape(-1, 2)
-
-
-def _size(size: Size, longer: int | None) -> Size | None:
-    if longer is None or longer >= size.longer:
-        return None
-    scale = longer / size.longer
-    return Size(max(1, round(size.width * scale)), max(1, round(size.height * scale)))
 
 
 def _changed(options: ShowOptions, changes: Mapping[str, Any]) -> ShowOptions:

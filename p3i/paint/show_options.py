@@ -28,12 +28,15 @@ class ShowOptions:
         "What to write at the objects, where there is room: names as `p3i points` gives them, i and j, or "
         "nothing.",
     ] = "names"
-    points: Annotated[bool, "Mark each object by a dot, or by a cross where it is not there."] = True
+    points: Annotated[
+        bool,
+        "Mark each object by a dot, by a cross where it is not there, by a grey dot where that is unknown.",
+    ] = True
     cells: Annotated[bool, "Outline the cells of the objects."] = True
     horizon: Annotated[bool, "Draw the plane's vanishing line, where it crosses the picture."] = True
     extent: Annotated[bool, "Draw a line around all cells together."] = True
     presence: Annotated[bool, "Look which objects are there; else each gets a dot."] = True
-    longer: Annotated[int | None, "Reduce the picture to a longer side of N pixels first."] = None
+    longer: Annotated[int, "Reduce larger photos to a longer side of N pixels first."] = 3000
     focal_mm: Annotated[
         float | None,
         "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
@@ -42,7 +45,7 @@ class ShowOptions:
     def __post_init__(self) -> None:
         if self.labels not in LABELS:
             raise UsageError(f"labels are {', '.join(LABELS)}, not {self.labels!r}")
-        if self.longer is not None and not 16 <= self.longer <= 20_000:
+        if not 16 <= self.longer <= 20_000:
             raise UsageError(f"the longer side has between 16 and 20000 pixels, not {self.longer}")
         if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
             raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
