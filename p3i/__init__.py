@@ -14,16 +14,30 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from p3i.api import eval_set, examples, points, read_image, rectify, render, score, show, synth, tile, trace
+    from p3i.api import (
+        eval_set,
+        examples,
+        inpaint,
+        points,
+        read_image,
+        rectify,
+        render,
+        score,
+        show,
+        synth,
+        tile,
+        trace,
+    )
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, loads
+    from p3i.paint.inpaint_options import InpaintOptions
     from p3i.paint.options import RenderOptions
     from p3i.paint.points_options import PointsOptions
     from p3i.paint.rectify_options import RectifyOptions
-    from p3i.paint.tile_options import TileOptions
     from p3i.paint.show_options import ShowOptions
+    from p3i.paint.tile_options import TileOptions
     from p3i.search.config import SearchConfig
     from p3i.search.result import StopReason, SynthesisResult
 
@@ -49,6 +63,8 @@ _HOMES = {
     "eval_set": "p3i.api",
     "expand": "p3i.language",
     "format": "p3i.language",
+    "inpaint": "p3i.api",
+    "InpaintOptions": "p3i.paint.inpaint_options",
     "load": "p3i.language",
     "loads": "p3i.language",
     "points": "p3i.api",
@@ -64,10 +80,10 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "score", "check", "format", "expand", "examples", "trace",
-    "eval_set", "load", "loads", "dump", "dumps", "read_image",
+    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "score", "check", "format",
+    "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions", "PointsOptions",
-    "ShowOptions", "RectifyOptions", "TileOptions",
+    "ShowOptions", "RectifyOptions", "TileOptions", "InpaintOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
 

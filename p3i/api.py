@@ -6,18 +6,19 @@ Functions load what they need when they are called, so that importing this modul
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Header, Program
 from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
+from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.options import RenderOptions
 from p3i.paint.points_options import PointsOptions
 from p3i.paint.rectify_options import RectifyOptions
-from p3i.paint.tile_options import TileOptions
 from p3i.paint.show_options import ShowOptions
+from p3i.paint.tile_options import TileOptions
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from p3i.evaluation.score_set import SetScore
     from p3i.paint.draw import RenderedPicture
     from p3i.paint.film import Film
+    from p3i.paint.inpaint import Inpainted
     from p3i.paint.objects import Objects
     from p3i.paint.rectify import Rectified
     from p3i.paint.tile import Tile
@@ -35,8 +37,8 @@ if TYPE_CHECKING:
     from p3i.vision.image import Image
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "score", "check", "format", "expand", "examples", "trace",
-    "eval_set", "load", "loads", "dump", "dumps", "read_image",
+    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "score", "check", "format",
+    "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
 ]  # fmt: skip
 
 Polygon = tuple[tuple[float, float], ...]
@@ -240,6 +242,32 @@ def tile(
 
     image, found = _photo_and_program(photo, program, config, progress=progress)
     return make(image, found, options, **changes)
+
+
+def inpaint(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None = None,
+    options: InpaintOptions | None = None,
+    *,
+    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
+    remove: Sequence[str | tuple[int, int]] = (),
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Inpainted":
+    """`photo` with a hole filled by `program`, or by the one that `synth` finds outside of the hole.
+
+    The hole is what `mask` marks (a picture whose white is to be filled, or bool [H, W]) and the cells of the
+    objects in `remove`, by name or (i, j); without either what is transparent. `changes` are fields of
+    InpaintOptions. The result has `pixels`, `paint()`, `save(path)`, `unlike` and `notes`. Raises FileError,
+    ParseError, UsageError, ProgramError for a program without objects on the photo, and NoPatternError.
+    """
+    from p3i.paint.inpaint import inpaint as fill
+
+    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    seen = _without(image, mask=mask, roi=None) if program is None else image
+    _, found = _photo_and_program(seen, program, config, progress=progress)
+    return fill(image, found, options, mask=mask, remove=remove, progress=progress, **changes)
 
 
 def eval_set(

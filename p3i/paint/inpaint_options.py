@@ -1,0 +1,53 @@
+"""The one record of options that filling takes: the Python API and the command line both read it.
+
+Imports neither torch nor numpy: `p3i inpaint --help` reads this file.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from p3i.errors import UsageError
+
+METHODS = ("stack", "npn", "patchmatch")
+"""The ways to fill a hole."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InpaintOptions:
+    """How to fill a hole. Raises UsageError for a value out of range."""
+
+    method: Annotated[
+        str,
+        "stack: a mean of aligned cells, in seconds; npn: the paper's neural painting network, trained on "
+        "this one photo, in minutes; patchmatch: PatchMatch guided by the program (extra `patchmatch`).",
+    ] = "stack"
+    steps: Annotated[int, "With npn: steps of training."] = 1500
+    time_s: Annotated[float | None, "With npn: stop training after this many seconds."] = None
+    checkpoint: Annotated[
+        Path | None, "With npn: a file that the training is kept in, and goes on from where it exists."
+    ] = None
+    seed: Annotated[int, "With npn and patchmatch: the seed of what is random."] = 0
+    device: Annotated[str, "With npn: where the network runs: auto, cpu, cuda, ..."] = "auto"
+    threads: Annotated[int, "With npn: threads of the network."] = 1
+    focal_mm: Annotated[
+        float | None,
+        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise UsageError(f"a method is one of {', '.join(METHODS)}, not {self.method!r}")
+        if self.steps < 1:
+            raise UsageError(f"training takes at least one step, not {self.steps}")
+        if self.time_s is not None and not (math.isfinite(self.time_s) and self.time_s > 0):
+            raise UsageError(f"a time limit is above 0 seconds, not {self.time_s:g}")
+        if self.threads < 1:
+            raise UsageError(f"at least one thread is needed, not {self.threads}")
+        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
+            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        if self.method != "npn":
+            for name, value in (("time", self.time_s), ("checkpoint", self.checkpoint)):
+                if value is not None:
+                    raise UsageError(f"--{name} belongs to the method npn, not to {self.method}")

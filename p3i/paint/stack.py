@@ -1,0 +1,177 @@
+"""Filling from aligned cells: each hole becomes a mean of its sources, weighted by what they say around it.
+
+The weights are those under which the sources together come closest to the photo around the hole (a regression
+drawn towards trusting each by its own misfit); what still differs at the hole's rim is carried into it
+smoothly, so that light and seams go over without an edge.
+
+Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W], True is to be filled.
+"""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.paint.cells import nearest
+from p3i.paint.placed import Placed
+from p3i.paint.sources import Ground, Hole, Source, hole_of, sources, taken
+from p3i.vision.fill import filled
+from p3i.vision.sheet import project
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+Progress = Callable[[str, float], None]
+
+# A piece of a hole with more cells than this is filled in blocks of two by two.
+_MOST_CELLS = 9
+# How far the weights are drawn to the sources' own misfits: a share of the mean square of the residuals.
+_RIDGE = 0.3
+# The rim at which the fill is compared with the photo, in pixels, and the most that is carried in from there.
+_RIM_PX = 2.0
+_MOST_CARRIED = 0.15
+# What is carried in is smoothed along the rim over this share of the distance to the next object.
+_SMOOTH = 0.125
+
+
+def fill_by_stack(
+    pixels: Floats, known: Mask, hole: Mask, placed: Placed, *, progress: Progress | None = None
+) -> tuple[Floats, Mask]:
+    """The photo with its hole filled, and where nothing like the hole was found [H, W].
+
+    What is not `known` is no source, and is not filled either unless the hole holds it. Where no source shows
+    a pixel, the surroundings are continued smoothly.
+    """
+    known = known & ~hole
+    ground = Ground.of(pixels, known)
+    result = pixels.copy()
+    result[hole] = 0
+    context = known.copy()  # what the next piece is compared with: also what was filled before it
+    bare = np.zeros_like(hole)
+    pieces = _pieces(hole, known, placed)
+    for done, points in enumerate(pieces):
+        if progress is not None:
+            progress("filling", done / len(pieces))
+        one = hole_of(points, result, context, placed)
+        colours, seen = _filled(one, ground, sources(one, ground, placed))
+        columns, rows = points.astype(int).T
+        result[rows, columns] = colours
+        bare[rows, columns] = ~seen
+        context[rows[seen], columns[seen]] = True
+    if bare.any():
+        result[bare] = filled(result, context)[bare]
+    return result, bare
+
+
+def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
+    """The hole piece by piece, pixels [N, 2] each: what hangs together, in blocks where it is large.
+
+    The blocks of a large piece come from its rim inwards, so that each has something beside it.
+    """
+    count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
+    rows, columns = np.nonzero(hole)
+    order = np.argsort(labels[rows, columns], kind="stable")
+    points = np.stack([columns, rows], 1)[order].astype(float)
+    ends = np.cumsum(np.bincount(labels[rows, columns], minlength=count)[1:])[:-1]
+    plane_from_image = np.linalg.inv(placed.image_from_plane)
+    found: list[Array] = []
+    deep = None
+    for piece in np.split(points, ends):
+        on_plane, _ = project(plane_from_image, piece)
+        cells = placed.index[nearest(placed, on_plane)]
+        if len(np.unique(cells, axis=0)) <= _MOST_CELLS:
+            found.append(piece)
+            continue
+        blocks, members = np.unique(cells // 2, axis=0, return_inverse=True)
+        parts = [piece[members.reshape(-1) == block] for block in range(len(blocks))]
+        if deep is None:
+            deep = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
+        depths = [float(deep[tuple(part.astype(int).T[::-1])].mean()) for part in parts]
+        found += [parts[place] for place in np.argsort(depths, kind="stable")]
+    return found
+
+
+def _filled(hole: Hole, ground: Ground, found: list[Source]) -> tuple[Floats, Mask]:
+    """The colours of a hole's pixels [N, 3], and which of them any source shows [N]."""
+    if not found:
+        return np.zeros((len(hole.points), 3), np.float32), np.zeros(len(hole.points), bool)
+    weights = _weights(hole, ground, found)
+    colours, weight = _mixed(hole.points, ground, found, weights, sharp=True)
+    return np.clip(colours + _carried(hole, ground, found, weights), 0, 1), weight > 1e-6
+
+
+def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
+    """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
+    misfits = np.array([source.misfit for source in found])
+    prior = 1 / (misfits**2 + 1e-5)
+    prior /= prior.sum()
+    residuals = []
+    for source in found:
+        at, front = source.where(hole.around)
+        colours = source.gain * taken(ground.pixels, at) + source.offset
+        shown = (front & ground.known(at))[:, None]
+        residuals.append(
+            (np.where(shown, colours - hole.colours, 0) * np.sqrt(hole.weights)[:, None]).ravel()
+        )
+    rows = np.stack(residuals)
+    products = rows @ rows.T / (3 * hole.weights.sum())
+    ridge = _RIDGE * np.trace(products) / len(found) + 1e-9
+    normal = products + ridge * np.eye(len(found))
+    towards, even = np.linalg.solve(normal, np.stack([ridge * prior, np.ones(len(found))], 1)).T
+    weights = np.clip(towards + even * (1 - towards.sum()) / even.sum(), 0, None)
+    return weights / weights.sum()
+
+
+def _mixed(
+    points: Array, ground: Ground, found: list[Source], weights: Array, *, sharp: bool
+) -> tuple[Floats, Array]:
+    """The sources' colours at the hole's points, mixed [N, 3], and the weight of those that show them [N]."""
+    total, weight = np.zeros((len(points), 3)), np.zeros(len(points))
+    for source, share in zip(found, weights, strict=True):
+        if share < 1e-4:
+            continue
+        at, front = source.where(points)
+        shown = share * (front & ground.known(at))
+        total += shown[:, None] * (source.gain * taken(ground.pixels, at, sharp=sharp) + source.offset)
+        weight += shown
+    return (total / np.maximum(weight, 1e-9)[:, None]).astype(np.float32), weight
+
+
+def _carried(hole: Hole, ground: Ground, found: list[Source], weights: Array) -> Floats:
+    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [N, 3]."""
+    margin = int(np.ceil(_RIM_PX)) + 1
+    low = np.maximum(hole.points.min(0).astype(int) - margin, 0)
+    width, height = (hole.points.max(0).astype(int) + margin + 1 - low).tolist()
+    inside = np.zeros((height, width), np.uint8)
+    columns, rows = (hole.points.astype(int) - low).T
+    inside[rows, columns] = 1
+    distance = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
+    known = np.zeros((height, width), bool)
+    part = ground.sure[low[1] : low[1] + height, low[0] : low[0] + width]
+    known[: part.shape[0], : part.shape[1]] = part > 0
+    rim_rows, rim_columns = np.nonzero((distance > 0) & (distance <= _RIM_PX) & known)
+    rim = np.stack([rim_columns + low[0], rim_rows + low[1]], 1).astype(float)
+    colours, weight = _mixed(rim, ground, found, weights, sharp=False)
+    compared = weight > 0.3
+    if not compared.any():
+        return np.zeros((len(hole.points), 3), np.float32)
+    rim_rows, rim_columns = rim_rows[compared], rim_columns[compared]
+    photo = ground.pixels[rim_rows + low[1], rim_columns + low[0]]
+    off = np.clip(photo - colours[compared], -_MOST_CARRIED, _MOST_CARRIED)
+    values, weighed = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
+    values[rim_rows, rim_columns], weighed[rim_rows, rim_columns] = off, 1
+    total = np.zeros((len(hole.points), 3), np.float32)
+    weight = np.zeros(len(hole.points), np.float32)
+    for scale in (
+        0.5,
+        1.0,
+        2.0,
+        4.0,
+    ):  # near the rim its own difference counts, further in that of all around
+        sigma = max(0.7, scale * _SMOOTH * hole.spacing_px)
+        for plane, summed in ((values, total), (weighed, weight)):
+            blurred = cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
+            summed += blurred[rows, columns] / scale
+    fading = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
+    return (total * fading[:, None]).astype(np.float32)

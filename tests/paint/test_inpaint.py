@@ -1,0 +1,189 @@
+"""Holes filled by the program: what stays, what comes in, and what cannot be filled."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from p3i import loads
+from p3i.errors import FileError, UsageError
+from p3i.evaluation.scenes import scene
+from p3i.paint.cells import moves, nearest
+from p3i.paint.inpaint import inpaint, parse_index
+from p3i.paint.placed import placed
+from p3i.vision.image import Image, read_image
+from p3i.vision.write import write_image
+
+LATTICE = """SetCameraPose(rx=-30, ry=10)
+for i in range(-4, 5):
+    for j in range(-3, 4):
+        Draw(x=9*i + 1, y=9*j)
+"""
+RING = """SetCameraPose(rx=-25, ry=5)
+for i in range(0, 12):
+    Draw(x=26*Cos(30*i), y=26*Sin(30*i))
+"""
+
+
+def drawn(text: str, *, seed: int = 0, width: int = 480, height: int = 400) -> Image:
+    """A picture of the program: a shaded mark on each object, whose direction follows its ring."""
+    blank = Image(np.zeros((height, width, 3), np.float32), np.ones((height, width), bool))
+    laid = placed(loads(text), blank)
+    rows, columns = np.mgrid[0:height, 0:width]
+    back = np.linalg.inv(laid.image_from_plane)
+    at = np.stack([columns, rows, np.ones_like(rows)], -1) @ back.T
+    points = (at[..., :2] / at[..., 2:]).reshape(-1, 2)
+    number = nearest(laid, points)
+    into_first = np.linalg.inv(moves(laid, 0))
+    local = np.einsum("nij,nj->ni", into_first[number][:, :2, :2], points) + into_first[number][:, :2, 2]
+    local = (local - laid.points[0]).reshape(height, width, 2)
+    inside = np.hypot(local[..., 0], local[..., 1]) < 3.2
+    light = 0.65 + 0.25 * columns / width
+    mark = np.stack([0.3 + 0.08 * local[..., 0], 0.4 + 0.06 * local[..., 1], np.full(light.shape, 0.2)], -1)
+    pixels = np.where(inside[..., None], mark, 0.8) * light[..., None]
+    noise = np.random.default_rng(seed).normal(0, 0.004, pixels.shape)
+    values = np.rint((pixels + noise).clip(0, 1) * 255) / 255
+    return Image(values.astype(np.float32), np.ones((height, width), bool))
+
+
+def cell_hole(photo: Image, text: str, number: int) -> np.ndarray:
+    laid = placed(loads(text), photo)
+    at = laid.centers_px()[0][number]
+    rows, columns = np.mgrid[0 : photo.size.height, 0 : photo.size.width]
+    return np.hypot(columns - at[0], rows - at[1]) < 22
+
+
+@pytest.mark.parametrize(("text", "number"), [(LATTICE, 31), (RING, 4)])
+def test_a_hidden_cell_comes_back_as_it_was(text: str, number: int) -> None:
+    photo = drawn(text)
+    hole = cell_hole(photo, text, number)
+    given = dataclasses.replace(photo, pixels=np.where(hole[:, :, None], np.float32(0), photo.pixels))
+    found = inpaint(given, loads(text), mask=hole)
+    wrong = np.abs(found.pixels - photo.pixels)[hole].mean() * 255
+    assert wrong < 4, f"mean L1 {wrong:.1f}"
+    assert found.unlike == 0
+
+
+def test_what_lies_outside_the_hole_stays_to_the_bit(tmp_path: Path) -> None:
+    photo = drawn(LATTICE)
+    hole = cell_hole(photo, LATTICE, 31)
+    write_image(tmp_path / "a.png", photo.pixels)
+    found = inpaint(read_image(tmp_path / "a.png"), loads(LATTICE), mask=hole)
+    found.save(tmp_path / "b.png")
+    before, after = (read_image(tmp_path / name).pixels for name in ("a.png", "b.png"))
+    assert np.array_equal(before[~hole], after[~hole])
+    assert not np.array_equal(before[hole], after[hole])
+
+
+def test_sixteen_bits_and_transparency_are_kept(tmp_path: Path) -> None:
+    photo = drawn(LATTICE)
+    hole = cell_hole(photo, LATTICE, 31)
+    alpha = np.ones(hole.shape, np.float32)
+    alpha[:40] = 0
+    alpha[hole] = 0
+    fine = photo.pixels + np.float32(100 / 65535)
+    write_image(tmp_path / "a.png", fine, alpha=alpha, bits=16)
+    given = read_image(tmp_path / "a.png")
+    found = inpaint(given, loads(LATTICE), mask=hole).paint()
+    assert found.bits == 16
+    assert found.alpha is not None
+    assert (found.alpha[hole] == 65535).all() and (found.alpha[:40] == 0).all()
+    outside = ~hole & given.valid
+    assert np.array_equal(found.values[outside], np.rint(given.pixels[outside] * 65535).astype(np.uint16))
+
+
+def test_without_a_mask_the_transparent_part_is_filled() -> None:
+    photo = drawn(LATTICE)
+    hole = cell_hole(photo, LATTICE, 31)
+    given = dataclasses.replace(photo, valid=~hole)
+    found = inpaint(given, loads(LATTICE))
+    assert np.array_equal(found.hole, hole)
+    assert np.abs(found.pixels - photo.pixels)[hole].mean() * 255 < 4
+
+
+def test_objects_are_removed_by_index_and_by_name() -> None:
+    photo, program = drawn(LATTICE), loads(LATTICE)
+    by_index = inpaint(photo, program, remove=["0,0"]).hole
+    assert by_index.sum() > 100
+    assert np.array_equal(inpaint(photo, program, remove=[(0, 0)]).hole, by_index)
+    assert np.array_equal(inpaint(photo, program, remove=["d5"]).hole, by_index)
+
+
+def test_a_hole_like_nothing_else_is_continued_and_said() -> None:
+    photo = drawn(LATTICE)
+    hole = np.zeros(photo.valid.shape, bool)
+    hole[:30, :30] = True
+    alone = loads(LATTICE.replace("range(-4, 5)", "range(0, 1)").replace("range(-3, 4)", "range(0, 1)"))
+    found = inpaint(photo, alone, mask=hole)
+    assert found.unlike == 1
+    assert any("continued" in note for note in found.notes)
+    assert np.isfinite(found.pixels).all()
+
+
+def test_light_is_matched_at_the_hole() -> None:
+    """A patch copied without matching would be off by the light's slope: about 12 of 255 a cell."""
+    photo = drawn(LATTICE)
+    ramp = np.linspace(0.55, 1.0, photo.size.width, dtype=np.float32)[None, :, None]
+    lit = dataclasses.replace(photo, pixels=photo.pixels * ramp)
+    hole = cell_hole(photo, LATTICE, 31)
+    found = inpaint(lit, loads(LATTICE), mask=hole)
+    assert np.abs(found.pixels - lit.pixels)[hole].mean() * 255 < 4
+
+
+@pytest.mark.parametrize(
+    ("mask", "said"),
+    [
+        (np.zeros((400, 480), bool), "nothing is to be filled"),
+        (np.ones((400, 480), bool), "all of the photo"),
+    ],
+)
+def test_empty_and_full_masks_are_refused(mask: np.ndarray, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        inpaint(drawn(LATTICE), loads(LATTICE), mask=mask)
+
+
+def test_a_mask_of_another_size_is_refused(tmp_path: Path) -> None:
+    write_image(tmp_path / "mask.png", np.ones((20, 30, 3), np.uint8) * 255)
+    with pytest.raises(FileError, match="30 x 20, but the photo is 480 x 400"):
+        inpaint(drawn(LATTICE), loads(LATTICE), mask=tmp_path / "mask.png")
+
+
+def test_an_object_that_is_not_there_is_refused_with_those_that_are() -> None:
+    with pytest.raises(UsageError, match=r"there is no object Z9 .*A1, A2, A3"):
+        inpaint(drawn(LATTICE), loads(LATTICE), remove=["Z9"])
+
+
+def test_a_bent_photo_is_filled_where_it_is_straight() -> None:
+    header = "# /// p3p\n# version = 1\n# lens_k1 = -0.05\n# ///\n"
+    photo = drawn(LATTICE)
+    hole = cell_hole(photo, LATTICE, 31)
+    found = inpaint(photo, loads(header + LATTICE), mask=hole)
+    assert np.array_equal(found.pixels[~hole], photo.pixels[~hole])
+    assert np.abs(found.pixels - photo.pixels)[hole].mean() * 255 < 25
+
+
+def test_moves_lay_each_object_on_each_other() -> None:
+    for text in (LATTICE, RING):
+        laid = placed(loads(text), drawn(text))
+        found = moves(laid, 2)
+        np.testing.assert_allclose(
+            found[:, :2, :2] @ laid.points[2] + found[:, :2, 2], laid.points, atol=1e-9
+        )
+    turn = moves(placed(loads(RING), drawn(RING)), 0)[3]
+    np.testing.assert_allclose(turn[:2, 0], [0, 1], atol=1e-12)  # three steps of 30 degrees
+
+
+def test_pieces_of_any_scene_are_filled_alike_twice() -> None:
+    one = scene("lattice", 3)
+    photo = one.image()
+    hole = np.zeros(photo.valid.shape, bool)
+    hole[photo.size.height // 2 - 20 :][:40, photo.size.width // 2 - 20 :][:, :40] = True
+    first, second = (inpaint(photo, one.program, mask=hole).pixels for _ in range(2))
+    assert np.array_equal(first, second)
+
+
+def test_indices_are_two_whole_numbers() -> None:
+    assert parse_index(" -3, 4") == (-3, 4)
+    assert parse_index("B3") is None
+    assert parse_index("1,2,3") is None
