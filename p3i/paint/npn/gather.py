@@ -1,0 +1,230 @@
+"""The source patches of one hole: other cells, aligned to it and matched in gain and light.
+
+The program aligns cells to a pixel or two (paper, supplement B); what is left is found on the known
+surroundings of the hole: a shift (Lucas-Kanade), a gain and an offset a channel, and how far each source can
+be trusted. A membrane then carries the difference at the hole's rim smoothly inwards, for each source.
+
+Convention: as in window.py. K sources.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from p3i.paint.npn.window import Bank, grid, project, step_px
+
+# Sources are weighed on at most so many pixels of the surroundings.
+_MOST_CONTEXT = 800
+# So many of the likeliest cells are aligned.
+_MOST_ALIGNED = 16
+# A shift is at most so many distances between cells.
+_MOST_SHIFT = 0.12
+# So many sources are kept even where the best is far better: the network may know a use for them.
+_FEWEST = 3
+# The membrane lifts or lowers by at most this.
+_MOST_LIFT = 0.15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stack:
+    """What the network sees of one hole: arrays [h, w] cover the window's core alone.
+
+    `target` [h, w, 3] (inside the hole it is the truth where that is known, and never shown to the network),
+    `hole` bool [h, w], `context` bool [h, w] (known, outside the hole), `sources` [K, h, w, 3] aligned and
+    matched, `known` bool [K, h, w], `lifts` [K, h, w, 3] the membranes, `weights` [K] (sum 1), `matrices`
+    [K, 3, 3] photo from window, `gains` and `offsets` [K, 3], `errors` [K] mean difference on the context.
+    """
+
+    target: np.ndarray
+    hole: np.ndarray
+    context: np.ndarray
+    sources: np.ndarray
+    known: np.ndarray
+    lifts: np.ndarray
+    weights: np.ndarray
+    matrices: np.ndarray
+    gains: np.ndarray
+    offsets: np.ndarray
+    errors: np.ndarray
+
+
+def gather(bank: Bank, hole: np.ndarray, *, target: int = 0, most: int = 10) -> Stack | None:
+    """The stack for a hole (bool [h, w]) in the window of cell number `target` of the bank, or None.
+
+    None: nothing is known round the hole, or no other cell shows what should be in it.
+    """
+    window, others = bank.window, [place for place in range(len(bank.cells)) if place != target]
+    context = bank.known[target] & ~hole
+    margin = 0.6 * window.pitch
+    far = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5))
+    rows, columns = np.nonzero(context & (far <= max(margin, 4)))
+    if len(rows) < 12:
+        return None
+    if len(rows) > _MOST_CONTEXT:
+        chosen = np.linspace(0, len(rows) - 1, _MOST_CONTEXT).astype(int)
+        rows, columns = rows[chosen], columns[chosen]
+    closeness = np.exp(-far[rows, columns] / (0.4 * max(margin, 4))).astype(np.float32)
+    wanted = bank.pixels[target][rows, columns]
+    hidden = {place: _hidden(bank, hole, target, place) for place in others}
+    known = {place: bank.known[place] & ~hidden[place] for place in others}
+    inside = bank.home[target] & hole
+    able = [
+        place
+        for place in others
+        if known[place][hole].mean() >= 0.6
+        and known[place][rows, columns].mean() >= 0.4
+        and (not inside.any() or bank.home[place][inside].mean() >= 0.9)
+        and bank.home[place][hole].mean() >= inside.sum() / hole.sum() - 0.1
+    ]
+    if not able:
+        return None
+    rough = [
+        _matched(bank.pixels[place][rows, columns], wanted, closeness * known[place][rows, columns])[2]
+        for place in able
+    ]
+    likeliest = [able[place] for place in np.argsort(rough, kind="stable")[:_MOST_ALIGNED]]
+    points = np.stack([columns, rows], axis=1).astype(float)
+    fits = [
+        _aligned(bank, place, points, wanted, closeness * known[place][rows, columns]) for place in likeliest
+    ]
+    order = np.argsort([fit[3] for fit in fits], kind="stable")[:most]
+    worst = 1.6 * fits[order[0]][3] + 0.002
+    order = [place for rank, place in enumerate(order) if rank < _FEWEST or fits[place][3] <= worst]
+    return _stacked(
+        bank,
+        hole,
+        target,
+        [(likeliest[place], known[likeliest[place]], fits[place]) for place in order],
+        (points, wanted, closeness),
+    )
+
+
+def _hidden(bank: Bank, hole: np.ndarray, target: int, place: int) -> np.ndarray:
+    """Where the window of cell `place` shows the ground that the hole of cell `target` hides."""
+    matrix = np.linalg.inv(bank.photo_from_window[target]) @ bank.photo_from_window[place]
+    size = (bank.window.width, bank.window.height)
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    # A pixel more, for the reach of cubic reading and of the shift that is still to come.
+    reach = 2 * int(np.ceil(0.03 * bank.window.pitch)) + 3
+    wide = cv2.dilate(hole.astype(np.uint8), np.ones((reach, reach), np.uint8)).astype(np.float32)
+    return cv2.warpPerspective(wide, matrix, size, flags=flags, borderMode=cv2.BORDER_CONSTANT) > 0
+
+
+def _matched(
+    source: np.ndarray, wanted: np.ndarray, trust: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Gain [3] and offset [3] that bring `source` [N, 3] near `wanted`, and the mean difference left."""
+    total = max(float(trust.sum()), 1e-9)
+    weight = trust[:, None]
+    source_mean, wanted_mean = (weight * source).sum(0) / total, (weight * wanted).sum(0) / total
+    spread = (weight * (source - source_mean) ** 2).sum(0) / total
+    shared = (weight * (source - source_mean) * (wanted - wanted_mean)).sum(0) / total
+    # Drawn towards 1: a flat surrounding says nothing of the gain.
+    gain = np.clip((shared + 0.1 * spread + 1e-4) / (1.1 * spread + 1e-4), 0.5, 2.0)
+    offset = wanted_mean - gain * source_mean
+    error = float((weight * np.abs(gain * source + offset - wanted)).sum() / total / 3)
+    return gain, offset, error
+
+
+def _aligned(
+    bank: Bank, place: int, points: np.ndarray, wanted: np.ndarray, trust: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Shift [2] in window pixels, gain, offset and error of one source, by Lucas-Kanade."""
+    matrix = bank.photo_from_window[place]
+    step = step_px(matrix, bank.window)
+    most = _MOST_SHIFT * bank.window.pitch
+
+    def read(shift: np.ndarray) -> np.ndarray:
+        return bank.pyramid.read(project(matrix, points + shift), step_px=step)
+
+    # The slopes hardly change over so short a way: they are read once.
+    right, left_of = read(np.array([0.5, 0])), read(np.array([-0.5, 0]))
+    below, above = read(np.array([0, 0.5])), read(np.array([0, -0.5]))
+    shift, best = np.zeros(2), None
+    for turn in range(4):
+        source = read(shift)
+        gain, offset, error = _matched(source, wanted, trust)
+        if best is None or error < best[3]:
+            best = (shift, gain, offset, error)
+        if turn == 3:
+            break
+        left = wanted - (gain * source + offset)
+        across, down = gain * (right - left_of), gain * (below - above)
+        weight = trust[:, None] / (np.abs(left) + 0.02)
+        normal = np.array(
+            [
+                [(weight * across * across).sum(), (weight * across * down).sum()],
+                [(weight * across * down).sum(), (weight * down * down).sum()],
+            ]
+        )
+        normal += np.eye(2) * (1e-3 * np.trace(normal) + 1e-6)
+        force = np.array([(weight * across * left).sum(), (weight * down * left).sum()])
+        shift = np.clip(shift + np.linalg.solve(normal, force), -most, most)
+    assert best is not None
+    return best
+
+
+def _stacked(bank: Bank, hole: np.ndarray, target: int, chosen: list, seen: tuple) -> Stack:
+    """The stack of the chosen sources: (place, known, fit) each; `seen`: context points, colours, weights."""
+    points, wanted, closeness = seen
+    window = bank.window
+    ground = grid(window.width, window.height)
+    context = bank.known[target] & ~hole
+    sources, knowns, lifts, matrices, differences = [], [], [], [], []
+    for place, known, (shift, gain, offset, _) in chosen:
+        matrix = bank.photo_from_window[place] @ np.array([[1, 0, shift[0]], [0, 1, shift[1]], [0, 0, 1.0]])
+        read = bank.pyramid.read(project(matrix, ground), step_px=step_px(matrix, window), cubic=True)
+        source = (gain * read + offset).astype(np.float32)
+        columns, rows = points.astype(int).T
+        differences.append(np.where(known[rows, columns][:, None], source[rows, columns] - wanted, 0))
+        lifts.append(membrane(bank.pixels[target] - source, hole, context & known, pitch=window.pitch))
+        sources.append(source)
+        knowns.append(known)
+        matrices.append(matrix)
+    errors = np.array([fit[3] for _, _, fit in chosen])
+    core = window.core
+    return Stack(
+        bank.pixels[target][core],
+        hole[core],
+        context[core],
+        np.stack([source[core] for source in sources]),
+        np.stack([known[core] for known in knowns]),
+        np.stack([lift[core] for lift in lifts]),
+        _weights(np.stack(differences), closeness, errors),
+        np.stack(matrices),
+        np.stack([fit[1] for _, _, fit in chosen]).astype(np.float32),
+        np.stack([fit[2] for _, _, fit in chosen]).astype(np.float32),
+        errors.astype(np.float32),
+    )
+
+
+def _weights(differences: np.ndarray, closeness: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Weights [K] of sum 1 whose mean is nearest the context: least squares, drawn to the inverse errors."""
+    count = len(errors)
+    prior = 1 / (errors**2 + 1e-5)
+    prior = prior / prior.sum()
+    scaled = (differences * np.sqrt(closeness)[None, :, None]).reshape(count, -1)
+    gram = scaled @ scaled.T / (3 * closeness.sum())
+    strength = 0.3 * np.trace(gram) / count + 1e-9
+    system = gram + strength * np.eye(count)
+    first, ones = np.linalg.solve(system, strength * prior), np.linalg.solve(system, np.ones(count))
+    weights = np.clip(first + ones * (1 - first.sum()) / ones.sum(), 1e-4, None)
+    return (weights / weights.sum()).astype(np.float32)
+
+
+def membrane(difference: np.ndarray, hole: np.ndarray, known: np.ndarray, *, pitch: float) -> np.ndarray:
+    """What the rim of a hole lacks, carried inwards: [h, w, 3], 0 where no rim is known.
+
+    `difference` [h, w, 3] is read on the known pixels within two of the hole; far rims count less.
+    """
+    far = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5))
+    rim = (known & (far <= 2.0) & ~hole).astype(np.float32)
+    read = np.clip(difference, -_MOST_LIFT, _MOST_LIFT) * rim[:, :, None]
+    total, weight = np.zeros_like(difference, dtype=np.float32), np.zeros(hole.shape, np.float32)
+    for size in (0.5, 1, 2, 4):
+        sigma = max(0.7, size * 0.125 * pitch)
+        total += cv2.GaussianBlur(read, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / size
+        weight += cv2.GaussianBlur(rim, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / size
+    mean = total / np.maximum(weight, 1e-9)[:, :, None]
+    return (mean * np.minimum(1, weight / 1e-3)[:, :, None]).astype(np.float32)
