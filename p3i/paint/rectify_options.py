@@ -7,7 +7,7 @@ import dataclasses
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 from p3i.errors import UsageError
 
@@ -18,6 +18,10 @@ PICTURE_KINDS = ("png", "jpg", "tiff", "webp")
 """The pictures that `rectify` and `tile` write."""
 
 _TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+
+
+Record = TypeVar("Record")
+"""A record of options."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +107,11 @@ def default(record: type, name: str) -> Any:
     return {field.name: field.default for field in dataclasses.fields(record)}[name]
 
 
-def changed(options: Any, changes: dict[str, Any], *, verb: str) -> Any:
+def changed(options: Record, changes: dict[str, Any], *, verb: str) -> Record:
     """`options` with the fields of `changes`; raises UsageError for a field that it does not have."""
-    known = {field.name for field in dataclasses.fields(options)}
+    known = {field.name for field in dataclasses.fields(options)}  # pyright: ignore[reportArgumentType]
     if unknown := sorted(changes.keys() - known):
         raise UsageError(f"{verb} has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    return dataclasses.replace(options, **changes) if changes else options
+    if not changes:
+        return options
+    return dataclasses.replace(options, **changes)  # pyright: ignore[reportArgumentType]

@@ -279,7 +279,7 @@ def robust_mean(values: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.nd
         near = known & (apart <= 2.5 * typical[..., None] + 128)
         total = np.einsum("hwck,hwk->hwc", block.astype(np.float32), near.astype(np.float32))
         mean[part] = total / (65535 * np.maximum(near.sum(axis=-1), 1)[:, :, None])
-    return mean, seen.any(axis=0)
+    return mean, np.asarray(seen.any(axis=0))
 
 
 def _median(values: np.ndarray, known: np.ndarray) -> np.ndarray:

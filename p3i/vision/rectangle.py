@@ -57,8 +57,13 @@ def largest_box(free: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 def _cells(points: NDArray[np.bool_], columns: int, rows: int) -> NDArray[np.bool_]:
     """Which coarse cells [rows, columns] are known at all their points, borders included."""
-    across = np.stack([points[:, k : k + _FINER * columns : _FINER] for k in range(_FINER + 1)]).all(axis=0)
-    return np.stack([across[k : k + _FINER * rows : _FINER] for k in range(_FINER + 1)]).all(axis=0)
+    across = np.ones((len(points), columns), bool)
+    for k in range(_FINER + 1):
+        across &= points[:, k : k + _FINER * columns : _FINER]
+    whole = np.ones((rows, columns), bool)
+    for k in range(_FINER + 1):
+        whole &= across[k : k + _FINER * rows : _FINER]
+    return whole
 
 
 def _grown(known: Known, low: Array, high: Array, *, step: Array) -> tuple[Array, Array]:

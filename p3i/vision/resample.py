@@ -144,10 +144,10 @@ def _tile(
     # Beyond any picture; keeps what lies behind the camera from overflowing.
     at_x, at_y = (np.clip(at, -1e5, 1e5).astype(np.float32) for at in (at_x, at_y))
     how = cv2.INTER_LANCZOS4 if samples == (1, 1) else cv2.INTER_CUBIC
-    found = np.asarray(cv2.remap(source, at_x, at_y, how, borderMode=cv2.BORDER_REFLECT_101))
+    found = np.asarray(cv2.remap(source, at_x, at_y, how, borderMode=cv2.BORDER_REFLECT_101), np.float32)
     if samples != (1, 1):
         across, down = (_sinc(count) for count in samples)
-        found = cv2.sepFilter2D(found, -1, across, down)
+        found = np.asarray(cv2.sepFilter2D(found, -1, across, down), np.float32)
         # The filter's reach is whole view pixels; those beside the tile are dropped here.
         found = found[_reach(samples[1]) :: samples[1], _reach(samples[0]) :: samples[0]][:height, :width]
     opacity = known.astype(np.float32)
@@ -157,7 +157,7 @@ def _tile(
         opacity = opacity * covered
     if not known.all() or source.shape[2] == 4:
         found = found * (opacity > 0)[:, :, None]
-    return np.clip(found, 0, 1), opacity
+    return np.asarray(np.clip(found, 0, 1), np.float32), opacity.astype(np.float32, copy=False)
 
 
 def _reach(count: int) -> int:
@@ -193,7 +193,8 @@ def _halved(source: NDArray[np.float32]) -> NDArray[np.float32]:
     height, width = source.shape[:2]
     if height % 2 or width % 2:
         source = np.asarray(
-            cv2.copyMakeBorder(source, 0, height % 2, 0, width % 2, borderType=cv2.BORDER_REPLICATE)
+            cv2.copyMakeBorder(source, 0, height % 2, 0, width % 2, borderType=cv2.BORDER_REPLICATE),
+            np.float32,
         )
     half = (source.shape[1] // 2, source.shape[0] // 2)
     return np.asarray(cv2.resize(source, half, interpolation=cv2.INTER_AREA), np.float32)
