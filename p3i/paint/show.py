@@ -159,7 +159,7 @@ def _priority(objects: tuple[Object, ...]) -> np.ndarray:
 def _with_room(anchors: np.ndarray, halves: np.ndarray, order: np.ndarray, size: Size) -> np.ndarray:
     """The labels [K], in order, that overlap none before them and lie on the picture."""
     limits = np.array([size.width, size.height]) - 0.5
-    inside = (anchors - halves >= -0.5).all(axis=1) & (anchors + halves <= limits).all(axis=1)
+    inside: np.ndarray = (anchors - halves >= -0.5).all(axis=1) & (anchors + halves <= limits).all(axis=1)
     kept = np.zeros(len(anchors), bool)
     # Labels are found again by the squares that they touch, each as large as the largest label.
     side = max(1.0, 2 * float(halves.max()))
@@ -174,8 +174,8 @@ def _with_room(anchors: np.ndarray, halves: np.ndarray, order: np.ndarray, size:
             for down in (row - 1, row, row + 1)
             for other in squares.get((across, down), ())
         ]
-        apart = np.asarray(np.abs(anchors[near] - anchors[place]) >= halves[near] + halves[place])
-        if apart.any(axis=1).all():
+        gaps: np.ndarray = np.abs(anchors[near] - anchors[place]) - halves[near] - halves[place]
+        if (gaps.max(axis=1, initial=-np.inf) >= 0).all():
             kept[place] = True
             squares.setdefault((column, row), []).append(place)
     return np.flatnonzero(kept)
