@@ -1,24 +1,15 @@
-"""The commands as functions: what `p3i synth`, `render`, `check`, ... do, for Python programs.
-
-Functions load what they need when they are called, so that importing this module costs nothing.
-"""
+"""Searching and measuring: `synth`, `score`, `trace`, `eval_set`, `examples`, and the reading of photos."""
 
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from p3i.errors import NoPatternError, UsageError
+from p3i.errors import UsageError
 from p3i.grammar.ast import Header, Program
-from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
-from p3i.paint.inpaint_options import InpaintOptions
-from p3i.paint.options import RenderOptions
-from p3i.paint.points_options import PointsOptions
-from p3i.paint.rectify_options import RectifyOptions
-from p3i.paint.show_options import ShowOptions
-from p3i.paint.tile_options import TileOptions
+from p3i.language import load, load_sketch
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
 
@@ -26,20 +17,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from p3i.evaluation.score_set import SetScore
-    from p3i.paint.draw import RenderedPicture
     from p3i.paint.film import Film
-    from p3i.paint.inpaint import Inpainted
-    from p3i.paint.objects import Objects
-    from p3i.paint.rectify import Rectified
-    from p3i.paint.tile import Tile
     from p3i.search.score import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
-
-__all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "score", "check", "format",
-    "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
-]  # fmt: skip
 
 Polygon = tuple[tuple[float, float], ...]
 Progress = Callable[[str, float], None]
@@ -90,7 +71,7 @@ def synth(
             options[name] = reader(options[name])
     config = dataclasses.replace(config or SearchConfig(), **options)
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
-    result = synthesize(_without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
+    result = synthesize(without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
     name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
     heard = tuple(note for note in image.notes if note not in result.notes)
     result = dataclasses.replace(result, notes=heard + result.notes)
@@ -122,152 +103,6 @@ def trace(trace: str | os.PathLike[str], *, image: str | os.PathLike[str] | None
     from p3i.paint.film import film_of
 
     return film_of(Path(trace), image=None if image is None else os.fspath(image))
-
-
-def render(
-    program: Program | str | os.PathLike[str],
-    options: RenderOptions | None = None,
-    *,
-    image: "str | os.PathLike[str] | Image | None" = None,
-    sprite: "str | os.PathLike[str] | Image | None" = None,
-    beside: str | os.PathLike[str] | None = None,
-    **changes: Any,
-) -> "RenderedPicture":
-    """Draw `program`, alone or over the photo `image`; `changes` are fields of RenderOptions.
-
-    `sprite` is a picture for every object; pictures named in the program are looked up beside its file, or
-    in the folder `beside`. The result has `pixels()`, `encode(kind)` and `save(path)`.
-    Raises FileError, ParseError and UsageError, as p3i.paint.draw.render, which draws.
-    """
-    from p3i.paint.draw import render as draw
-
-    return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
-
-
-def show(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None = None,
-    options: ShowOptions | None = None,
-    *,
-    config: SearchConfig | None = None,
-    progress: Progress | None = None,
-    **changes: Any,
-) -> "RenderedPicture":
-    """The overlay to look at first: `program` over `photo`, with objects, cells, names, horizon and extent.
-
-    Without a program it is found first, by `config`. `changes` are fields of ShowOptions. The result has
-    `pixels()`, `encode(kind)` and `save(path)`. Raises as `points`.
-    """
-    from p3i.paint.show import show as draw
-    from p3i.paint.source import read_program
-
-    given = read_program(program) if isinstance(program, str | os.PathLike) else program
-    image, found = _photo_and_program(photo, given, config, progress=progress)
-    return draw(image, found, options, **changes)
-
-
-def points(
-    program: "Program | str | os.PathLike[str] | Image",
-    options: PointsOptions | None = None,
-    *,
-    image: "str | os.PathLike[str] | Image | None" = None,
-    config: SearchConfig | None = None,
-    progress: Progress | None = None,
-    **changes: Any,
-) -> "Objects":
-    """The objects of `program` with their places, names, cells and, on the photo `image`, their presence.
-
-    `program` may be a photo, in memory or as a file: then its program is found first, by `config`. `changes`
-    are fields of PointsOptions. The result has `objects`, `columns`, `rows`, `counts`, `differs_from(size)`
-    and `encode(format)`. Raises FileError, ParseError, UsageError, ProgramError for a program that draws
-    nothing in front of its camera, and NoPatternError for a photo without a pattern.
-    """
-    from p3i.paint.objects import objects_of
-    from p3i.paint.source import is_photo, read_program
-    from p3i.vision.image import Image
-
-    given: Program | None = program if isinstance(program, Program) else None
-    if isinstance(program, Image) or (isinstance(program, str | os.PathLike) and is_photo(program)):
-        if image is not None:
-            raise UsageError("both are photos: name a program and its photo, or the photo alone")
-        image = program
-    elif given is None:
-        assert isinstance(program, str | os.PathLike)
-        given = read_program(program)
-    name = Path(image).name if isinstance(image, str | os.PathLike) and os.fspath(image) != "-" else None
-    if image is None:
-        assert given is not None
-        return objects_of(given, None, options, **changes)
-    photo, found = _photo_and_program(image, given, config, progress=progress)
-    return objects_of(found, photo, options, image=name, **changes)
-
-
-def rectify(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None = None,
-    options: RectifyOptions | None = None,
-    *,
-    config: SearchConfig | None = None,
-    progress: Progress | None = None,
-    **changes: Any,
-) -> "Rectified":
-    """The plane of `photo` as seen straight on, by `program`, or by the one that `synth` finds by `config`.
-
-    `changes` are fields of RectifyOptions. The result has `paint()`, `save(path)`, `back(edited)`, `record()`
-    and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program without objects on the
-    photo, and NoPatternError for a photo without a pattern.
-    """
-    from p3i.paint.rectify import rectify as straighten
-
-    image, found = _photo_and_program(photo, program, config, progress=progress)
-    return straighten(image, found, options, **changes)
-
-
-def tile(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None = None,
-    options: TileOptions | None = None,
-    *,
-    config: SearchConfig | None = None,
-    progress: Progress | None = None,
-    **changes: Any,
-) -> "Tile":
-    """A seamless texture of the pattern on `photo`, by `program`, or by the one that `synth` finds by `config`.
-
-    `changes` are fields of TileOptions. The result has `pixels`, `paint()`, `save(path)`, `record()`, `seam` and
-    `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program that is neither a lattice nor
-    rings or has no object on the photo, and NoPatternError for a photo without a pattern.
-    """
-    from p3i.paint.tile import tile as make
-
-    image, found = _photo_and_program(photo, program, config, progress=progress)
-    return make(image, found, options, **changes)
-
-
-def inpaint(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None = None,
-    options: InpaintOptions | None = None,
-    *,
-    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
-    remove: Sequence[str | tuple[int, int]] = (),
-    config: SearchConfig | None = None,
-    progress: Progress | None = None,
-    **changes: Any,
-) -> "Inpainted":
-    """`photo` with a hole filled by `program`, or by the one that `synth` finds outside of the hole.
-
-    The hole is what `mask` marks (a picture whose white is to be filled, or bool [H, W]) and the cells of the
-    objects in `remove`, by name or (i, j); without either what is transparent. `changes` are fields of
-    InpaintOptions. The result has `pixels`, `paint()`, `save(path)`, `unlike` and `notes`. Raises FileError,
-    ParseError, UsageError, ProgramError for a program without objects on the photo, and NoPatternError.
-    """
-    from p3i.paint.inpaint import inpaint as fill
-
-    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    seen = _without(image, mask=mask, roi=None) if program is None else image
-    _, found = _photo_and_program(seen, program, config, progress=progress)
-    return fill(image, found, options, mask=mask, remove=remove, progress=progress, **changes)
 
 
 def eval_set(
@@ -328,27 +163,7 @@ def examples(
     )
 
 
-def _photo_and_program(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None,
-    config: SearchConfig | None = None,
-    *,
-    progress: Progress | None = None,
-) -> "tuple[Image, Program]":
-    """Both in memory: read where they are files, the program found by `synth` where there is none.
-
-    Raises NoPatternError where none is found, FileError and ParseError for files that cannot be read.
-    """
-    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    if program is None:
-        result = synth(image, config, progress=progress)
-        if result.program is None:
-            raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
-        return image, result.program
-    return image, program if isinstance(program, Program) else load(Path(program))
-
-
-def _without(
+def without(
     image: "Image", *, mask: "str | os.PathLike[str] | np.ndarray | None", roi: Polygon | None
 ) -> "Image":
     """`image` with what `mask` marks, and what lies outside `roi`, made unknown."""
