@@ -65,7 +65,7 @@ class RectifyOptions:
         "Pixels of the view per pixel of the photo, where the photo is sharpest at the pattern's middle. "
         "[default: 1, or less where --max-px asks for it]",
     ] = None
-    max_px: Annotated[int, "Make no view of more than N pixels (width times height)."] = 40_000_000
+    max_px: Annotated[int, "Make no view of more than N pixels (width times height)."] = 36_000_000
     cell: Annotated[
         CellSize | None,
         "The true size of one cell of a lattice, such as 600x600mm: sets the proportions, whatever the "

@@ -16,6 +16,7 @@ from p3i.errors import UsageError
 from p3i.interp.lens import photo_from_straight, straight_from_photo
 from p3i.paint.placed import Placed
 from p3i.paint.rectify_options import CellSize
+from p3i.paint.supercell import reduced
 from p3i.size import Size
 from p3i.vision.sheet import project
 
@@ -24,6 +25,9 @@ _SKEW_SNAP = 0.12
 
 _RIGHT_DEG = 4.0
 """Directions that are this near to a right angle count as at one: an assumed focal skews by as much."""
+
+_LEAST_ANGLE_DEG = 50.0
+"""Where u and v are closer than this, the lattice's two shortest vectors stand for them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +136,7 @@ def _off_axis_rad(basis: np.ndarray) -> float:
     That is: u across (or v, where u is more than 45 degrees off), or a pair of directions at right angles
     along both axes; u + v and u - v are one where u and v are as long as each other, as on a chessboard.
     """
-    u, v = basis
+    u, v = basis if _angle_between_deg(*basis) >= _LEAST_ANGLE_DEG else reduced(basis) @ basis
     across = [math.remainder(_angle_rad(vector), math.pi) for vector in (u, v)]
     turns = [min(across, key=abs) if abs(across[0]) > math.pi / 4 else across[0]]
     turns += [
@@ -145,13 +149,19 @@ def _off_axis_rad(basis: np.ndarray) -> float:
     return next(turn for turn in turns if abs(turn) <= least + math.radians(0.01))
 
 
+def _angle_between_deg(first: np.ndarray, second: np.ndarray) -> float:
+    """The angle between two lines, up to 90."""
+    return math.degrees(
+        math.atan2(abs(first[0] * second[1] - first[1] * second[0]), abs(float(first @ second)))
+    )
+
+
 def _angle_rad(vector: np.ndarray) -> float:
     return math.atan2(vector[1], vector[0])
 
 
 def _square(first: np.ndarray, second: np.ndarray) -> bool:
-    cosine = abs(float(first @ second)) / float(np.linalg.norm(first) * np.linalg.norm(second))
-    return cosine <= math.sin(math.radians(_RIGHT_DEG))
+    return _angle_between_deg(first, second) >= 90 - _RIGHT_DEG
 
 
 def _turn(angle_rad: float) -> np.ndarray:

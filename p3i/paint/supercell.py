@@ -44,7 +44,7 @@ def supercell(basis: np.ndarray) -> SuperCell:
 
     `basis` [2, 2] has rows u and v, not parallel.
     """
-    shortest = _reduced(basis)
+    shortest = reduced(basis)
     steps = [np.array(pair) @ shortest for pair in product(range(-MOST, MOST + 1), repeat=2) if any(pair)]
     vectors = [(pair, pair @ basis) for pair in steps if math.gcd(*pair.tolist()) == 1]
     for widest_deg in (45.0, 90.0):
@@ -83,7 +83,7 @@ def _rank(cell: SuperCell) -> tuple[float, ...]:
     return (*(round(number, 6) for number in (*order, longer, lean)), *cell.steps.ravel().tolist())
 
 
-def _reduced(basis: np.ndarray) -> np.ndarray:
+def reduced(basis: np.ndarray) -> np.ndarray:
     """Steps [2, 2] of the two shortest vectors that span the lattice (Lagrange and Gauss)."""
     steps = np.eye(2, dtype=int)
     for _ in range(64):

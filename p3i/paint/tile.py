@@ -23,7 +23,7 @@ from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.resample import resample
 
-_MOST_PATCHES, _MOST_SAMPLES = 64, 30_000_000
+_MOST_PATCHES, _MOST_SAMPLES = 64, 10_000_000
 """No tile is made of more patches, or of more pixels of patches, than this; the nearest are taken."""
 
 _LEAST_SEEN = 0.25

@@ -114,6 +114,13 @@ def test_a_board_whose_lattice_runs_along_its_diagonals_stands_straight() -> Non
     assert abs(u[0]) == pytest.approx(abs(u[1]), rel=0.05), "the sides of the squares run across, not u"
 
 
+def test_a_lattice_written_askew_stands_on_its_shortest_vectors() -> None:
+    askew = LATTICE.replace("8*i - 1.2*j + 1, y=1.2*i + 8*j", "8*i + 14.8*j + 1, y=1.2*i + 10.4*j")
+    plain, skewed = (rectify(blank(), loads(text)).view.view_from_plane for text in (LATTICE, askew))
+    turns = [np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0])) for matrix in (plain, skewed)]
+    assert turns[0] == pytest.approx(turns[1], abs=1e-6)
+
+
 def test_as_seen_does_not_turn_and_no_view_mirrors() -> None:
     for upright in (True, False):
         matrix = rectify(blank(), loads(LATTICE), upright=upright).view.view_from_plane
