@@ -139,7 +139,7 @@ def tile(
     """A seamless texture of the pattern on `photo`, by `program` or by the one that `synth` finds.
 
     `changes` are fields of TileOptions. The result has `pixels`, `paint()`, `save(path)`, `record()`, `seam`
-    and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program that is neither a lattice
+    and `notes`. Raises FileError, ParseError, UsageError, ProgramError for what is neither a lattice
     nor rings or has no object on the photo, and NoPatternError for a photo without a pattern.
     """
     from p3i.paint.tile import tile as make

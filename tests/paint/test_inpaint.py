@@ -1,6 +1,7 @@
 """Holes filled by the program: what stays, what comes in, and what cannot be filled."""
 
 import dataclasses
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -187,3 +188,26 @@ def test_indices_are_two_whole_numbers() -> None:
     assert parse_index(" -3, 4") == (-3, 4)
     assert parse_index("B3") is None
     assert parse_index("1,2,3") is None
+
+
+def test_patchmatch_puts_a_mark_where_one_was() -> None:
+    """Outside the hole nothing changes, and a mark comes back where one was."""
+    photo = drawn(LATTICE)
+    hole = cell_hole(photo, LATTICE, 31)
+    given = dataclasses.replace(photo, pixels=np.where(hole[:, :, None], np.float32(0), photo.pixels))
+    found = inpaint(given, loads(LATTICE), mask=hole, method="patchmatch")
+    assert np.array_equal(found.pixels[~hole], given.pixels[~hole])
+    assert np.abs(found.pixels - photo.pixels)[hole].mean() * 255 < 12
+
+
+def test_patchmatch_on_a_ring_says_that_nothing_guides_it() -> None:
+    photo = drawn(RING)
+    found = inpaint(photo, loads(RING), mask=cell_hole(photo, RING, 4), method="patchmatch")
+    assert any("unguided" in note for note in found.notes)
+
+
+def test_without_pypatchmatch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "patchmatch", None)
+    photo = drawn(LATTICE)
+    with pytest.raises(UsageError, match=r"p3i\[patchmatch\]"):
+        inpaint(photo, loads(LATTICE), mask=cell_hole(photo, LATTICE, 31), method="patchmatch")
