@@ -159,7 +159,8 @@ def _priority(objects: tuple[Object, ...]) -> np.ndarray:
 def _with_room(anchors: np.ndarray, halves: np.ndarray, order: np.ndarray, size: Size) -> np.ndarray:
     """The labels [K], in order, that overlap none before them and lie on the picture."""
     limits = np.array([size.width, size.height]) - 0.5
-    inside: np.ndarray = (anchors - halves >= -0.5).all(axis=1) & (anchors + halves <= limits).all(axis=1)
+    room = np.minimum(anchors - halves + 0.5, limits - anchors - halves)
+    inside = np.asarray(room.min(axis=1) >= 0)
     kept = np.zeros(len(anchors), bool)
     # Labels are found again by the squares that they touch, each as large as the largest label.
     side = max(1.0, 2 * float(halves.max()))

@@ -73,6 +73,8 @@ def test_plain_crops_are_pieces_of_the_photo(folder: Path) -> None:
     crop, photo = read_image(folder / "c" / "B2.png").pixels, read_image(folder / "photo.png").pixels
     height, width = crop.shape[:2]
     places = np.lib.stride_tricks.sliding_window_view(photo, (height, width, 3))[:, :, 0]
+    cell = {each.name: each for each in api.points("grid.p3p").objects}["B2"].cell_px
+    assert np.abs(np.ptp(np.array(cell), axis=0) - (width, height)).max() < 2
     assert (places == crop).all(axis=(2, 3, 4)).sum() == 1
 
 

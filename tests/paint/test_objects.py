@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from p3i import loads
 from p3i.errors import UsageError
+from p3i.paint.clip import area
 from p3i.paint.naming import letters
 from p3i.paint.objects import objects_of
 from p3i.size import Size
@@ -173,3 +174,4 @@ def test_the_middle_of_rings_has_a_disc_for_its_cell() -> None:
     middle = objects_of(loads(text), None, size=SIZE).objects[0]
     away = np.linalg.norm(np.array(middle.cell), axis=1)
     assert np.ptp(away) < 1e-5 and 3.9 < away[0] < 4.1
+    assert area(np.array(middle.cell)) == pytest.approx(np.pi * 16, rel=0.02)
