@@ -10,6 +10,7 @@ import pytest
 from click import unstyle
 
 from p3i import api
+from p3i.api import pictures
 from p3i.cli.main import run
 from p3i.paint.source import is_photo
 from p3i.search.result import StopReason, SynthesisResult
@@ -100,7 +101,7 @@ def test_a_photo_has_its_program_found_first(folder: Path, monkeypatch: pytest.M
         asked.append(photo)
         return SynthesisResult(program=api.loads(GRID), stop=StopReason.FOUND)
 
-    monkeypatch.setattr(api, "synth", found)
+    monkeypatch.setattr(pictures, "synth", found)
     assert run(["points", "photo.png"]) == 0
     assert len(asked) == 1 and capsys.readouterr().out.startswith("name,row")
     assert run(["show", "photo.png", "-o", "over.png", "-q"]) == 0
@@ -111,7 +112,7 @@ def test_a_photo_without_a_pattern_exits_with_5(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     nothing = SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.02, needed=0.13)
-    monkeypatch.setattr(api, "synth", lambda *_, **__: nothing)
+    monkeypatch.setattr(pictures, "synth", lambda *_, **__: nothing)
     assert run(["points", "photo.png"]) == 5
     assert "no regular pattern" in capsys.readouterr().err
 
