@@ -14,6 +14,8 @@ import numpy as np
 
 from p3i.paint.npn.window import Bank, grid, project, step_px
 
+# The surroundings that sources are weighed on reach this far, in distances between cells.
+_MARGIN = 0.4
 # Sources are weighed on at most so many pixels of the surroundings.
 _MOST_CONTEXT = 800
 # So many of the likeliest cells are aligned.
@@ -21,7 +23,11 @@ _MOST_ALIGNED = 16
 # A shift is at most so many distances between cells.
 _MOST_SHIFT = 0.12
 # So many sources are kept even where the best is far better: the network may know a use for them.
-_FEWEST = 3
+_FEWEST = 2
+# A source shows at least so much of the hole and of its surroundings, ...
+_LEAST_KNOWN = 0.3
+# ... and has objects near at least so much of what has them in the hole.
+_LEAST_HOME = 0.6
 # The membrane lifts or lowers by at most this.
 _MOST_LIFT = 0.15
 
@@ -56,7 +62,7 @@ def gather(bank: Bank, hole: np.ndarray, *, target: int = 0, most: int = 10) -> 
     """
     window, others = bank.window, [place for place in range(len(bank.cells)) if place != target]
     context = bank.known[target] & ~hole
-    margin = 0.6 * window.pitch
+    margin = _MARGIN * window.pitch
     far = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5))
     rows, columns = np.nonzero(context & (far <= max(margin, 4)))
     if len(rows) < 12:
@@ -72,10 +78,9 @@ def gather(bank: Bank, hole: np.ndarray, *, target: int = 0, most: int = 10) -> 
     able = [
         place
         for place in others
-        if known[place][hole].mean() >= 0.6
-        and known[place][rows, columns].mean() >= 0.4
-        and (not inside.any() or bank.home[place][inside].mean() >= 0.9)
-        and bank.home[place][hole].mean() >= inside.sum() / hole.sum() - 0.1
+        if known[place][hole].mean() >= _LEAST_KNOWN
+        and known[place][rows, columns].mean() >= _LEAST_KNOWN
+        and (not inside.any() or bank.home[place][inside].mean() >= _LEAST_HOME)
     ]
     if not able:
         return None
@@ -121,7 +126,7 @@ def _matched(
     spread = (weight * (source - source_mean) ** 2).sum(0) / total
     shared = (weight * (source - source_mean) * (wanted - wanted_mean)).sum(0) / total
     # Drawn towards 1: a flat surrounding says nothing of the gain.
-    gain = np.clip((shared + 0.1 * spread + 1e-4) / (1.1 * spread + 1e-4), 0.5, 2.0)
+    gain = np.clip((shared + 0.1 * spread + 1e-3) / (1.1 * spread + 1e-3), 0.5, 2.0)
     offset = wanted_mean - gain * source_mean
     error = float((weight * np.abs(gain * source + offset - wanted)).sum() / total / 3)
     return gain, offset, error

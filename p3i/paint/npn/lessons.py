@@ -4,6 +4,8 @@ Most of them are the very hole that is to be painted, laid onto other cells; the
 1.2 cells and whole cells. Cells that any hole touches are never the target of a lesson.
 """
 
+import time
+
 import numpy as np
 import torch
 
@@ -13,16 +15,25 @@ from p3i.paint.npn.window import Bank
 
 # One in so many of the cells is kept to judge by.
 _JUDGE = 6
+# So many are tried to be cut however late it is.
+_FEWEST = 12
 # A step sees so many sources at most: the more, the slower, and a few teach as much.
 _AT_MOST = 6
 
 
 def lessons(
-    bank: Bank, hole: np.ndarray, *, count: int, most: int, seed: int
+    bank: Bank,
+    hole: np.ndarray,
+    *,
+    count: int,
+    most: int,
+    seed: int,
+    until: float | None = None,
 ) -> tuple[list[Stack], list[Stack]]:
     """Stacks to learn from and stacks to judge by, of different cells; `hole` bool [h, w] is the true one.
 
-    About `count` together; fewer, or none, where few cells are known.
+    About `count` together; fewer, or none, where few cells are known, or where the clock (time.monotonic)
+    says it is after `until`.
     """
     chance = np.random.default_rng(seed)
     able = [place for place in range(1, len(bank.cells)) if _teaches(bank, hole, place)]
@@ -33,7 +44,8 @@ def lessons(
     learned: list[Stack] = []
     judged: list[Stack] = []
     for turn in range(2 * count):
-        if len(learned) + len(judged) >= count:
+        late = until is not None and turn >= _FEWEST and time.monotonic() > until
+        if len(learned) + len(judged) >= count or late:
             break
         place = order[turn % len(order)]
         drawn = _cut(bank, hole, place, chance, own=turn < len(order) or bool(chance.random() < 0.6))
@@ -53,7 +65,7 @@ def _teaches(bank: Bank, hole: np.ndarray, place: int) -> bool:
     """Whether the truth under the hole is known in that cell's window, and most of its surroundings."""
     known = bank.known[place]
     inside = bank.home[0] & hole
-    alike = not inside.any() or bank.home[place][inside].mean() >= 0.9
+    alike = not inside.any() or bank.home[place][inside].mean() >= 0.6
     return bool(alike and known[hole].mean() >= 0.98 and known[~hole].mean() >= 0.4)
 
 

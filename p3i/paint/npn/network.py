@@ -8,7 +8,8 @@ the sources' membranes to take, and a correction in colour: see docs/npn.md for 
 Convention: B patches of K sources, [B, K, C, h, w]; colours in 0..1; `known` 1 where a source is evidence.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import cast
 
 import torch
@@ -19,6 +20,7 @@ WIDTHS = (16, 32, 32)
 """Channels of the three scales."""
 _KEY = 16
 _INPUTS = 16
+_PLANES = ("target", "hole", "context", "sources", "lifts", "known")
 # A source that is unknown at a pixel gets this logit there.
 _NEVER = -30.0
 
@@ -36,6 +38,10 @@ class Batch:
     lifts: Tensor
     known: Tensor
     weights: Tensor
+
+    def seen(self, view: Callable[[Tensor], Tensor]) -> "Batch":
+        """The batch with each of its planes [..., h, w] seen another way."""
+        return replace(self, **{name: view(getattr(self, name)) for name in _PLANES})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,15 +66,15 @@ def plain_logits(batch: Batch) -> Tensor:
     return torch.where(batch.known > 0.5, weights, _NEVER + 0.1 * weights)
 
 
-def plain_fill(batch: Batch) -> Tensor:
-    """The weighted mean of the sources with their membranes [B, 3, h, w]: the network before training."""
-    return blend(
-        batch, torch.softmax(plain_logits(batch), 1), torch.ones_like(batch.hole), batch.target.new_zeros(())
-    )
+def plain(batch: Batch) -> Painted:
+    """The weighted mean of the sources with their membranes: what the network says before training."""
+    attention = torch.softmax(plain_logits(batch), 1)
+    strength, correction = torch.ones_like(batch.hole), torch.zeros_like(batch.target)
+    return Painted(attention, strength, correction, blend(batch, attention, strength, correction))
 
 
 class PaintingNetwork(nn.Module):
-    """The generator. Untrained it paints `plain_fill`: all that it adds to that starts at zero."""
+    """The generator. Untrained it paints `plain`: all that it adds to that starts at zero."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,6 +129,27 @@ class PaintingNetwork(nn.Module):
         attention = torch.softmax(logits, 1)
         strength = 1 + self.strength(decoded0)
         correction = 0.2 * torch.tanh(self.correction(decoded0))
+        return Painted(attention, strength, correction, blend(batch, attention, strength, correction))
+
+
+def painted_all_ways(network: PaintingNetwork, batch: Batch) -> Painted:
+    """What a network says of a batch and of its seven mirrorings and turns, in the mean; no gradients."""
+    said: list[tuple[Tensor, ...]] = []
+    with torch.no_grad():
+        for turned in (False, True):
+            for axes in ((), (-1,), (-2,), (-1, -2)):
+
+                def there(values: Tensor, axes: tuple[int, ...] = axes, turned: bool = turned) -> Tensor:
+                    values = values.flip(axes) if axes else values
+                    return values.transpose(-1, -2) if turned else values
+
+                def back(values: Tensor, axes: tuple[int, ...] = axes, turned: bool = turned) -> Tensor:
+                    values = values.transpose(-1, -2) if turned else values
+                    return values.flip(axes) if axes else values
+
+                found = network(batch.seen(there))
+                said.append((back(found.attention), back(found.strength), back(found.correction)))
+        attention, strength, correction = (torch.stack(parts).mean(0) for parts in zip(*said, strict=True))
         return Painted(attention, strength, correction, blend(batch, attention, strength, correction))
 
 

@@ -20,7 +20,9 @@ class NetworkOptions:
         "Stop training after so many seconds. Where the clock stops it, two runs need not agree.",
     ] = 120.0
     seed: Annotated[int, "Of every choice made by chance: equal input, options and seed, equal picture."] = 0
-    device: Annotated[str, "Where to train: cpu, or a device of PyTorch's such as cuda."] = "cpu"
+    device: Annotated[
+        str, "Where to train: cpu, auto (cuda where there is one), or a device of PyTorch's."
+    ] = "cpu"
     threads: Annotated[int | None, "Threads of PyTorch's; by default as many as it takes itself."] = None
     checkpoint: Annotated[
         Path | None, "A file that keeps the state of the training; where it exists, training goes on from it."

@@ -1,24 +1,26 @@
 """`paint`: the neural painting network from a photo and a hole to the filled photo."""
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 import torch
 
+from p3i.errors import UsageError
 from p3i.paint.npn import checkpoint
 from p3i.paint.npn.gather import Stack, gather
 from p3i.paint.npn.lessons import batch_of, lessons
-from p3i.paint.npn.network import Painted, blend, plain_logits
+from p3i.paint.npn.network import Painted, painted_all_ways, plain
 from p3i.paint.npn.options import NetworkOptions
-from p3i.paint.npn.training import Progress, Training, begun, threads, train
+from p3i.paint.npn.training import Progress, begun, threads, train
 from p3i.paint.npn.window import Bank, Window, bank_of, project, step_px, window_of
 from p3i.paint.placed import Placed
+from p3i.paint.stack import fill_by_stack
 from p3i.vision.image import Image
 
-# Photos larger than this many pixels are blended in parts.
-_ROWS = 64
+# Where a photo is read at more points than this, OpenCV is asked in parts: it takes fewer than 32768 a side.
+_AT_ONCE = 30_000
 
 
 def paint(
@@ -31,78 +33,114 @@ def paint(
 ) -> np.ndarray:
     """The photo [H, W, 3] float32 with the hole (bool [H, W]) filled; pixels outside stay bit-identical.
 
-    Each part of the hole that hangs together is learned for on its own, with an equal share of the time. A
-    part that no other cell shows is filled from its rim. Pixels of the hole are never read. Raises ValueError
-    for a hole of another size, FileError for a checkpoint that is not of this photo and hole.
+    The network starts from the stack's fill and adds what it has learned. Each part of the hole that hangs
+    together is learned for on its own, with an equal share of the time; a part that too few other cells show
+    stays as the stack fills it. Pixels of the hole are never read. `progress` is told the step, of how many,
+    and the latest mean L1 (0 to 255). Raises ValueError for a hole of another size, UsageError for a device
+    that is not there, FileError for a checkpoint that is not of this photo and hole.
     """
     if hole.shape != photo.valid.shape or hole.dtype != np.bool_:
         raise ValueError(f"the hole is bool {photo.valid.shape}, not {hole.dtype} {hole.shape}")
-    result = photo.pixels.copy()
+    device = _device(options.device)
+    result, _ = fill_by_stack(photo.pixels, photo.valid, hole, placed)
     corrupted = replace(photo, valid=photo.valid & ~hole)
     key = checkpoint.fingerprint(photo, placed, hole, options) if options.checkpoint else ""
     begin = time.monotonic()
     count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
-    left_over = np.zeros_like(hole)
     with threads(options.threads):
         for place in range(1, count):
             part = labels == place
             until = None if options.time_s is None else begin + options.time_s * place / (count - 1)
-            found = _painted(corrupted, placed, part, options, (place, key, until), progress)
-            if found is None:
-                left_over |= part
-                continue
-            colours, some = found
-            rows, columns = np.nonzero(part)
-            result[rows[some], columns[some]] = colours[some]
-            left_over[rows[~some], columns[~some]] = True
-    if left_over.any():
-        result[left_over] = _from_rim(result, left_over)[left_over]
+            turn = _Turn(place, count - 1, key, until, device, progress)
+            change = _change(corrupted, placed, (part, result[part]), options, turn)
+            result[part] = np.clip(result[part] + change, 0, 1)
     return result
 
 
-def _painted(
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """Which part of the hole it is, of how many, the checkpoint's key, and the clock's end for it."""
+
+    place: int
+    parts: int
+    key: str
+    until: float | None
+    device: torch.device
+    progress: Progress | None
+
+    def told(self, step: int, steps: int, error: float) -> None:
+        if self.progress is not None:
+            self.progress((self.place - 1) * steps + step, self.parts * steps, error)
+
+
+def _change(
     photo: Image,
     placed: Placed,
-    part: np.ndarray,
+    piece: tuple[np.ndarray, np.ndarray],
     options: NetworkOptions,
-    turn: tuple[int, str, float | None],
-    progress: Progress | None,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Colours [P, 3] of the pixels of one part of the hole, and which of them [P] any source shows."""
-    place, key, until = turn
+    turn: _Turn,
+) -> np.ndarray:
+    """What the network adds [P, 3] to the stack's fill of one part of the hole: 0 where it knows nothing.
+
+    `piece`: the part, bool [H, W], and the colours [P, 3] that the stack has filled it with.
+    """
+    part, filled = piece
+    nothing = np.zeros((int(part.sum()), 3), np.float32)
     window = window_of(placed, part, working_px=options.working_px)
     bank = bank_of(photo, placed, window)
-    seen = _seen(part, window)
+    seen = part_on_window(part, window)
     stack = gather(bank, seen, most=options.sources)
     if stack is None:
-        return None
-    device = torch.device(options.device)
-    training = begun(seed=options.seed, device=device)
-    resumed = options.checkpoint is not None and checkpoint.load(options.checkpoint, key, place, training)
-    if options.steps > training.step or resumed:
-        learned, judged = lessons(bank, seen, count=options.examples, most=options.sources, seed=options.seed)
-        if learned:
-            keep = None
-            if (path := options.checkpoint) is not None:
+        return nothing
+    training = begun(seed=options.seed, device=turn.device)
+    path = options.checkpoint
+    if path is not None:
+        checkpoint.load(path, turn.key, turn.place, training)
+    if options.steps > training.step:
+        # A third of the time for cutting lessons is much; a photo of few and small cells takes a second.
+        now = time.monotonic()
+        stop = None if turn.until is None else now + (turn.until - now) / 3
+        learned, judged = lessons(
+            bank, seen, count=options.examples, most=options.sources, seed=options.seed, until=stop
+        )
+        if not learned:
+            return nothing
+        train(
+            training,
+            learned,
+            judged,
+            steps=options.steps,
+            seed=options.seed,
+            adversarial=options.adversarial,
+            until=turn.until,
+            save=None if path is None else lambda state: checkpoint.save(path, turn.key, turn.place, state),
+            progress=turn.told,
+        )
+    if not training.best_weights or training.best_share == 0:
+        return nothing
+    training.mean.load_state_dict(training.best_weights)
+    batch = batch_of([stack], device=turn.device)
+    before = _composed(bank, stack, plain(batch), part)
+    after = _composed(bank, stack, painted_all_ways(training.mean, batch), part)
+    # A correction of one mean of the sources is no correction of another: where the stack's fill is farther
+    # from the mean that the network started from than this was wrong on other cells, less of it is taken.
+    apart = float(np.abs(np.clip(before, 0, 1) - filled).mean())
+    trust = training.best_share * min(1.0, training.best_error / max(apart, 1e-6))
+    return (trust * (after - before)).astype(np.float32)
 
-                def keep(state: Training) -> None:
-                    checkpoint.save(path, key, place, state)
 
-            train(
-                training,
-                learned,
-                judged,
-                steps=options.steps,
-                seed=options.seed,
-                adversarial=options.adversarial,
-                until=until,
-                save=keep,
-                progress=progress,
-            )
-    return _composed(bank, stack, _said(training, stack, device), part)
+def _device(name: str) -> torch.device:
+    if name == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        device = torch.device(name)
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        raise UsageError(f"there is no device {name!r} to train on: say cpu or auto ({error})") from None
+    return device
 
 
-def _seen(part: np.ndarray, window: Window) -> np.ndarray:
+def part_on_window(part: np.ndarray, window: Window) -> np.ndarray:
     """The hole on the window's pixels: all that it touches."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     wide = part.astype(np.float32)
@@ -114,78 +152,48 @@ def _seen(part: np.ndarray, window: Window) -> np.ndarray:
     )
 
 
-def _said(training: Training, stack: Stack, device: torch.device) -> Painted:
-    """What the trained network says of a stack: the mean over its eight mirrorings, mixed by its share."""
-    batch = batch_of([stack], device=device)
-    plain = torch.softmax(plain_logits(batch), 1)
-    share = training.best_share if training.best_weights else 0.0
-    attention, strength = plain, torch.ones_like(batch.hole)
-    correction = torch.zeros_like(batch.target)
-    if share > 0:
-        network = training.mean
-        network.load_state_dict(training.best_weights)
-        with torch.no_grad():
-            said = network(batch)
-        attention = plain + share * (said.attention - plain)
-        strength = 1 + share * (said.strength - 1)
-        correction = share * said.correction
-    return Painted(attention, strength, correction, blend(batch, attention, strength, correction))
+def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.ndarray:
+    """The colours [P, 3] of one part's pixels, at the photo's size, from what was said on the window's.
 
-
-def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The photo's own pixels of one part, from what was said on the window's: sources read at full size."""
+    Attention, strength, membranes and correction are smooth enough to be magnified; the sources are read
+    anew, so that detail finer than the window's is kept.
+    """
     window = bank.window
     rows, columns = np.nonzero(part)
     places = project(np.linalg.inv(window.photo_from_window), np.stack([columns, rows], 1).astype(float))
+    core = (places - [window.core[1].start, window.core[0].start]).astype(np.float32)
 
-    core = places - [window.core[1].start, window.core[0].start]
-
-    def lifted(values: torch.Tensor | np.ndarray) -> np.ndarray:
+    def magnified(planes: np.ndarray) -> np.ndarray:
         """[C, h, w] read at the hole's pixels: [P, C]."""
-        array = values.cpu().numpy() if isinstance(values, torch.Tensor) else values
-        x, y = (np.ascontiguousarray(core[None, :, axis], np.float32) for axis in (0, 1))
-        return np.concatenate(
-            [_at(np.ascontiguousarray(plane), x, y)[0][:, None] for plane in array],
-            axis=1,
-        )
+        return np.stack([_at(np.ascontiguousarray(plane), core) for plane in planes], axis=1)
 
-    attention = lifted(said.attention[0, :, 0])
-    strength, correction = lifted(said.strength[0]), lifted(said.correction[0])
+    attention = magnified(said.attention[0, :, 0].cpu().numpy())
+    strength = magnified(said.strength[0].cpu().numpy())
     total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
     for source, matrix in enumerate(stack.matrices):
         points = project(matrix, places)
-        known = bank.pyramid.read_known(points)
         step = step_px(matrix, window) * window.scale
         colours = bank.pyramid.read(points, step_px=step, cubic=True)
         colours = colours * stack.gains[source] + stack.offsets[source]
-        colours = colours + strength * lifted(np.moveaxis(stack.lifts[source], -1, 0))
-        share = attention[:, source] * known
+        colours = colours + strength * magnified(np.moveaxis(stack.lifts[source], -1, 0))
+        share = attention[:, source] * bank.pyramid.read_known(points)
         total += share[:, None] * colours
         weight += share
-    some = weight > 1e-4
-    filled = total / np.maximum(weight, 1e-4)[:, None] + correction
-    return np.clip(filled, 0, 1).astype(np.float32), some
+    filled = total / np.maximum(weight, 1e-4)[:, None] + magnified(said.correction[0].cpu().numpy())
+    # Where no source shows the ground there is nothing to tell of.
+    return np.where((weight > 1e-2)[:, None], filled, 0)
 
 
-def _at(plane: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """One plane [h, w] read at points [1, P] each; OpenCV takes fewer than 32768 at a time."""
-    part = 30_000
-    return np.concatenate(
-        [
-            cv2.remap(
-                plane,
-                x[:, at : at + part],
-                y[:, at : at + part],
-                cv2.INTER_LINEAR,
-                borderMode=cv2.BORDER_REPLICATE,
-            )
-            for at in range(0, x.shape[1], part)
-        ],
-        axis=1,
-    )
-
-
-def _from_rim(pixels: np.ndarray, hole: np.ndarray) -> np.ndarray:
-    """What no cell shows, from what surrounds it (Telea 2004)."""
-    eight = np.round(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
-    return cv2.inpaint(eight, hole.astype(np.uint8), 3, cv2.INPAINT_TELEA).astype(np.float32) / 255
+def _at(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """One plane [h, w] read at points [P, 2]: [P]."""
+    found = [
+        cv2.remap(
+            plane,
+            np.ascontiguousarray(points[None, first : first + _AT_ONCE, 0]),
+            np.ascontiguousarray(points[None, first : first + _AT_ONCE, 1]),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )[0]
+        for first in range(0, len(points), _AT_ONCE)
+    ]
+    return np.concatenate(found)

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from p3i.paint.npn.gather import Stack
 from p3i.paint.npn.lessons import batch_of, varied
-from p3i.paint.npn.network import Batch, PaintingNetwork, PatchDiscriminator, plain_fill
+from p3i.paint.npn.network import Batch, PaintingNetwork, PatchDiscriminator, plain
 
 Progress = Callable[[int, int, float], None]
 """Told of step, of how many, and the mean L1 (0..255) over the latest holes."""
@@ -29,6 +29,8 @@ _RATE = 2e-3
 # The discriminator needs something to look at: it starts when the blend has settled.
 _ADVERSARY_FROM = 80
 _MEAN = 0.97
+# What is taken for the error (0..1) where no cell is left to judge by.
+_UNKNOWN = 0.03
 _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -117,6 +119,9 @@ def train(
             if save is not None:
                 save(training)
     if training.step % EVERY:
+        # Saved before it is judged: one that goes on is not to be judged here.
+        if save is not None:
+            save(training)
         judge(training, test)
 
 
@@ -124,12 +129,13 @@ def judge(training: Training, test: Batch | None) -> None:
     """Keep the running mean of the weights if it paints the judges' holes better than any before."""
     if test is None:
         training.best_weights = deepcopy(training.mean.state_dict())
-        training.best_share = 0.5
+        # Nothing tells how good it is: half of it is taken.
+        training.best_share, training.best_error = 0.5, _UNKNOWN
         return
     with torch.no_grad():
-        plain = plain_fill(test)
+        start = plain(test).fill
         painted = torch.cat([training.mean(_part(test, place)).fill for place in _each(test)])
-        errors = {share: _error(plain + share * (painted - plain), test).item() for share in _SHARES}
+        errors = {share: _error(start + share * (painted - start), test).item() for share in _SHARES}
     share = min(_SHARES, key=lambda share: errors[share])
     if errors[share] < training.best_error:
         training.best_weights = deepcopy(training.mean.state_dict())
@@ -150,11 +156,10 @@ def _step(training: Training, batch: Batch, *, adversarial: float) -> float:
     fake = outside + painted * batch.hole
     against = adversarial > 0 and training.step >= _ADVERSARY_FROM
     if against:
-        seen = F.interpolate(batch.hole, scale_factor=0.25, mode="area")
         training.discriminator.requires_grad_(False)
         said = training.discriminator(fake, batch.hole)
         training.discriminator.requires_grad_(True)
-        loss = error - adversarial * _inside(said, seen)
+        loss = error - adversarial * _inside(said, batch.hole)
     training.generator_steps.zero_grad(set_to_none=True)
     loss.backward()
     torch.nn.utils.clip_grad_norm_(training.generator.parameters(), 1.0)
@@ -163,7 +168,7 @@ def _step(training: Training, batch: Batch, *, adversarial: float) -> float:
         real = outside + batch.target * batch.hole
         true = training.discriminator(real, batch.hole)
         false = training.discriminator(fake.detach(), batch.hole)
-        judged = _inside(F.relu(1 - true), seen) + _inside(F.relu(1 + false), seen)
+        judged = _inside(F.relu(1 - true), batch.hole) + _inside(F.relu(1 + false), batch.hole)
         training.discriminator_steps.zero_grad(set_to_none=True)
         judged.backward()
         training.discriminator_steps.step()
@@ -175,9 +180,9 @@ def _step(training: Training, batch: Batch, *, adversarial: float) -> float:
     return error.item()
 
 
-def _inside(said: Tensor, seen: Tensor) -> Tensor:
-    """The mean of what the discriminator says [B, 1, h, w] where its places see the hole."""
-    weight = F.interpolate(seen, said.shape[-2:], mode="area") + 1e-3
+def _inside(said: Tensor, hole: Tensor) -> Tensor:
+    """The mean of what the discriminator says [B, 1, ~h / 4, ~w / 4] where its places see the hole."""
+    weight = F.interpolate(hole, said.shape[-2:], mode="area") + 1e-3
     return (said * weight).sum() / weight.sum()
 
 

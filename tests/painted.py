@@ -1,0 +1,77 @@
+"""A small lattice with known truth: discs that differ in colour, under light that falls off to one side."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from p3i import loads
+from p3i.paint.npn.gather import Stack, gather
+from p3i.paint.npn.lessons import lessons
+from p3i.paint.npn.paint import part_on_window
+from p3i.paint.npn.window import Bank, bank_of, window_of
+from p3i.paint.placed import Placed, placed
+from p3i.vision.image import Image
+
+PROGRAM = """SetCameraPose(rx=-20, ry=8)
+for i in range(-3, 4):
+    for j in range(-2, 3):
+        Draw(x=13*i, y=13*j)
+"""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A photo, its program, a hole, and what the hole hides is in `photo` still (no method may look)."""
+
+    photo: Image
+    placed: Placed
+    hole: np.ndarray
+
+    @property
+    def corrupted(self) -> Image:
+        return Image(
+            np.where(self.hole[:, :, None], np.float32(0), self.photo.pixels), self.photo.valid & ~self.hole
+        )
+
+    def error(self, filled: np.ndarray) -> float:
+        """The mean L1 over the hole, 0 to 255."""
+        return 255 * float(np.abs(filled - self.photo.pixels)[self.hole].mean())
+
+
+def scene() -> Scene:
+    """160 x 120 pixels, 7 x 5 cells; the hole is a box of 0.7 cells in the middle."""
+    height, width = 120, 160
+    chance = np.random.default_rng(5)
+    blank = Image(np.zeros((height, width, 3), np.float32), np.ones((height, width), bool))
+    laid = placed(loads(PROGRAM), blank)
+    points = np.stack(np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float)), -1)
+    plane_from_image = np.linalg.inv(laid.image_from_plane)
+    moved = points @ plane_from_image[:, :2].T + plane_from_image[:, 2]
+    plane = moved[..., :2] / moved[..., 2:]
+    pixels = np.full((height, width, 3), 0.65, np.float32)
+    # The ring of a disc is of the colour that its middle is a darker shade of: the rim tells of the middle.
+    for center in laid.points:
+        far = np.hypot(*(plane - center).transpose(2, 0, 1))
+        colour = chance.uniform(0.25, 0.95, 3)
+        pixels[far < 5.6] = colour
+        pixels[far < 3.2] = 0.4 * colour + 0.1
+    light = 1 - 0.45 * points[..., :1] / width
+    pixels = cv2.GaussianBlur((pixels * light).astype(np.float32), (0, 0), 0.7)
+    hole = np.zeros((height, width), bool)
+    hole[55:69, 74:88] = True
+    return Scene(Image(pixels, np.ones((height, width), bool)), laid, hole)
+
+
+def bank(found: Scene) -> tuple[Bank, np.ndarray]:
+    """The scene's bank of windows, and its hole on the window."""
+    window = window_of(found.placed, found.hole, working_px=48)
+    return bank_of(found.corrupted, found.placed, window), part_on_window(found.hole, window)
+
+
+def stacks(found: Scene, *, count: int = 24) -> tuple[Stack, list[Stack], list[Stack]]:
+    """The hole's own stack, stacks to learn from, and stacks to judge by."""
+    windows, hole = bank(found)
+    own = gather(windows, hole)
+    assert own is not None
+    return own, *lessons(windows, hole, count=count, most=6, seed=0)
