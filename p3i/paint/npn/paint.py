@@ -13,7 +13,7 @@ from p3i.paint.npn.gather import Stack, gather
 from p3i.paint.npn.lessons import batch_of, lessons
 from p3i.paint.npn.network import Painted, painted_all_ways, plain
 from p3i.paint.npn.options import NetworkOptions
-from p3i.paint.npn.training import Progress, begun, threads, train
+from p3i.paint.npn.training import EVERY, Progress, begun, threads, train
 from p3i.paint.npn.window import Bank, Window, bank_of, project, step_px, window_of
 from p3i.paint.placed import Placed
 from p3i.paint.stack import fill_by_stack
@@ -96,7 +96,8 @@ def _change(
     path = options.checkpoint
     if path is not None:
         checkpoint.load(path, turn.key, turn.place, training)
-    if options.steps > training.step:
+    # A training that ended between two judgements is judged at its end, each time it is read back.
+    if options.steps > training.step or training.step % EVERY:
         # A third of the time for cutting lessons is much; a photo of few and small cells takes a second.
         now = time.monotonic()
         stop = None if turn.until is None else now + (turn.until - now) / 3

@@ -1,6 +1,7 @@
 """The network: blind to the order and number of its sources, and a weighted mean before it has learned."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import torch
 from painted import scene, stacks
 
 from p3i.paint.npn.lessons import batch_of, varied
-from p3i.paint.npn.network import Batch, PaintingNetwork, painted_all_ways, plain
+from p3i.paint.npn.network import Batch, PaintingNetwork, PatchDiscriminator, painted_all_ways, plain
 
 CPU = torch.device("cpu")
 
@@ -101,3 +102,9 @@ def test_a_varied_batch_is_the_same_problem_in_other_light(batch: Batch) -> None
         torch.testing.assert_close(other.weights.sum(1), torch.ones(1))
         apart = (other.sources - other.target[:, None])[:, 0].abs().mean()
         assert 0.2 * apart <= (batch.sources - batch.target[:, None]).abs().mean() <= 5 * apart
+
+
+def test_the_printout_in_the_documents_is_that_of_the_network() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "npn.md").read_text(encoding="utf-8")
+    assert repr(PaintingNetwork()) in text
+    assert repr(PatchDiscriminator()) in text

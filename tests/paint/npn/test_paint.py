@@ -16,7 +16,7 @@ from p3i.paint.npn.paint import paint
 from p3i.paint.npn.training import EVERY, begun, train
 from p3i.paint.stack import fill_by_stack
 
-SHORT = NetworkOptions(steps=12, time_s=None, threads=1, examples=16, sources=5)
+SHORT = NetworkOptions(steps=12, time_s=None, threads=1, examples=10, sources=5)
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +52,8 @@ def test_a_training_that_was_cut_off_goes_on_to_the_same_picture(photo: Scene, t
     resumed = paint(photo.photo, photo.placed, photo.hole, kept, progress=lambda step, *_: steps.append(step))
     assert steps[0] == EVERY + 1
     np.testing.assert_array_equal(resumed, whole)
+    read_back = paint(photo.photo, photo.placed, photo.hole, kept)
+    np.testing.assert_array_equal(read_back, whole)
 
 
 def test_a_shorter_training_goes_on_as_a_longer_one(photo: Scene) -> None:
@@ -78,10 +80,10 @@ def test_a_checkpoint_of_another_hole_is_refused(photo: Scene, tmp_path: Path) -
 
 def test_training_learns_and_beats_a_plain_mean_of_the_cells(photo: Scene) -> None:
     """Judged on cells that it never trained on."""
-    own, learned, judged = stacks(photo, count=48)
-    assert len(judged) >= 4
+    own, learned, judged = stacks(photo, count=40)
+    assert len(judged) >= 3
     training = begun(seed=0, device=torch.device("cpu"))
-    train(training, learned, judged, steps=80, seed=0, adversarial=0.002)
+    train(training, learned, judged, steps=120, seed=0, adversarial=0.002)
     test = batch_of(judged, device=torch.device("cpu"))
     holes = test.hole.sum((1, 2, 3))
 
@@ -92,7 +94,7 @@ def test_training_learns_and_beats_a_plain_mean_of_the_cells(photo: Scene) -> No
     weights = test.weights[:, :, None, None, None] > 0
     mean = (test.sources * weights).sum(1) / weights.sum(1)
     start = error(plain(test).fill)
-    assert training.best_error < 0.93 * start
+    assert training.best_error < 0.95 * start
     assert training.best_error < 0.8 * error(mean)
     assert len(own.weights) >= 4
 
