@@ -23,7 +23,7 @@ class InpaintOptions:
         "stack: a mean of aligned cells, in seconds; npn: the paper's neural painting network, trained on "
         "this one photo, in minutes; patchmatch: PatchMatch guided by the program (extra `patchmatch`).",
     ] = "stack"
-    steps: Annotated[int, "With npn: steps of training."] = 1500
+    steps: Annotated[int, "With npn: steps of training for each part of the hole."] = 400
     time_s: Annotated[float | None, "With npn: stop training after this many seconds."] = None
     checkpoint: Annotated[
         Path | None, "With npn: a file that the training is kept in, and goes on from where it exists."
