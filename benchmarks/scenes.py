@@ -33,6 +33,7 @@ WHOLE = 0.15
 """Lattice vectors agree when they are whole combinations of the true ones up to this."""
 
 POSE_DEG = 1.0
+FIXED_DEG = 0.5
 F1 = 0.8
 
 
@@ -43,6 +44,8 @@ class Row:
     structure: StructureFound
     counts: bool
     """Whether enough objects are seen for the pose to be asked for."""
+    fixed: bool
+    """Whether the objects' places fix the tilt to half a degree (standard error), read as well as can be."""
     found: StructureFound | None = None
     pose_deg: float = 90.0
     index: float | None = None
@@ -68,8 +71,9 @@ class Row:
 def compare(drawn: Scene, result: SynthesisResult, seconds: float) -> Row:
     """Hold an answer to the truth of its scene."""
     counts = many_enough(drawn)
+    fixed = drawn.pose_sigma_deg is None or drawn.pose_sigma_deg <= FIXED_DEG
     if result.program is None:
-        return Row(structure=drawn.structure, counts=counts, seconds=seconds)
+        return Row(structure=drawn.structure, counts=counts, fixed=fixed, seconds=seconds)
     pose_deg = apart_deg(drawn.camera, Camera.of(result.program))
     centers = np.array(result.centers).reshape(-1, 4)
     index, same = _lattice_match(drawn, centers)
@@ -79,6 +83,7 @@ def compare(drawn: Scene, result: SynthesisResult, seconds: float) -> Row:
     return Row(
         structure=drawn.structure,
         counts=counts,
+        fixed=fixed,
         found=result.structure,
         pose_deg=pose_deg,
         index=index,
@@ -144,6 +149,9 @@ def summary(name: str, rows: Sequence[Row]) -> str:
     if poses:
         share = np.mean([pose < POSE_DEG for pose in poses])
         posed = f"pose below 1 degree {share:.0%} of {len(poses)}, median {statistics.median(poses):.2f}"
+        sure = [row.pose_deg < POSE_DEG for row in rows if row.counts and row.fixed]
+        if sure:
+            posed += f" ({np.mean(sure):.0%} of the {len(sure)} whose objects fix it)"
     return (
         f"{name}: {len(rows)} scenes, answered {np.mean([row.found is not None for row in rows]):.0%}, "
         f"right structure {right:.0%}, "

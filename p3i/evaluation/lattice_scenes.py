@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from p3i.evaluation.looks import LOOKS, Random, texture, varied
+from p3i.evaluation.pose_sigma import lattice_sigma_deg
 from p3i.evaluation.scene import Scene, as_sprite, least_distance, on_canvas
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Program
 from p3i.interp.camera import Camera
@@ -25,6 +26,9 @@ _SIZE = Size(640, 480)
 
 _LEAST_VISIBLE = 12
 """Objects that a scene must show."""
+
+_STRAY = 0.05
+"""Objects stray from their places by this share of the spacing, times the jitter."""
 
 _LEAST_SPACING_PX = 16.0
 """Objects stand at least this far apart in the picture, or nothing could be told from it."""
@@ -57,7 +61,10 @@ def lattice_scene(seed: int, options: SceneOptions | None = None, **changes: Any
         if len(index) >= _LEAST_VISIBLE and least_distance(centers_px) >= _LEAST_SPACING_PX:
             break
     pixels = _pixels(program, look, random, options)
-    return Scene(pixels, program, centers_px, index, look, seed, hidden=np.zeros(len(index), bool))
+    stray = _STRAY * options.jitter * _spacing(program)
+    sigma = lattice_sigma_deg(program, index, options.size, stray_units=stray)
+    hidden = np.zeros(len(index), bool)
+    return Scene(pixels, program, centers_px, index, look, seed, hidden=hidden, pose_sigma_deg=sigma)
 
 
 def _program(random: Random, options: SceneOptions) -> Program:
@@ -93,10 +100,8 @@ def _pixels(program: Program, look: str, random: Random, options: SceneOptions) 
     kinds = [varied(first, random, jitter=options.jitter) for _ in range(24)]
     sprites = [as_sprite(kind) for kind in kinds]
     drawn = np.array(points(program), dtype=np.float64).reshape(-1, 4)[:, :2]
-    draw = nest(program).draw
-    assert isinstance(draw.x, Affine) and isinstance(draw.y, Affine)
-    spacing = min(math.hypot(draw.x.i, draw.y.i), math.hypot(draw.x.j, draw.y.j))
-    moved = drawn + random.normal(0, 0.05 * options.jitter * spacing, drawn.shape)
+    spacing = _spacing(program)
+    moved = drawn + random.normal(0, _STRAY * options.jitter * spacing, drawn.shape)
     turns = random.permutation(max(1, len(sprites)))
     layer = lay(
         camera_view(Camera.of(program), size),
@@ -113,6 +118,13 @@ def _pixels(program: Program, look: str, random: Random, options: SceneOptions) 
     canvas = cv2.GaussianBlur(canvas * light.astype(np.float32), (0, 0), random.uniform(0.4, 0.9))
     canvas = canvas + random.normal(0, options.noise, canvas.shape).astype(np.float32)
     return np.rint(np.clip(canvas, 0, 1) * 255).astype(np.uint8)
+
+
+def _spacing(program: Program) -> float:
+    """The shorter step of a lattice, in program units."""
+    draw = nest(program).draw
+    assert isinstance(draw.x, Affine) and isinstance(draw.y, Affine)
+    return min(math.hypot(draw.x.i, draw.y.i), math.hypot(draw.x.j, draw.y.j))
 
 
 def _add_clutter(canvas: np.ndarray, random: Random, count: int) -> None:
