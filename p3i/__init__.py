@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from p3i.api import (
         eval_set,
         examples,
+        extend,
         inpaint,
         points,
         read_image,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, loads
+    from p3i.paint.extend_options import ExtendOptions
     from p3i.paint.inpaint_options import InpaintOptions
     from p3i.paint.options import RenderOptions
     from p3i.paint.points_options import PointsOptions
@@ -62,6 +64,8 @@ _HOMES = {
     "examples": "p3i.api",
     "eval_set": "p3i.api",
     "expand": "p3i.language",
+    "extend": "p3i.api",
+    "ExtendOptions": "p3i.paint.extend_options",
     "format": "p3i.language",
     "inpaint": "p3i.api",
     "InpaintOptions": "p3i.paint.inpaint_options",
@@ -80,10 +84,10 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "score", "check", "format",
-    "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
+    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "score", "check",
+    "format", "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions", "PointsOptions",
-    "ShowOptions", "RectifyOptions", "TileOptions", "InpaintOptions",
+    "ShowOptions", "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
 

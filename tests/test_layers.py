@@ -44,9 +44,11 @@ LIGHT += [
     "p3i.paint.points_options",
     "p3i.paint.show_options",
     "p3i.paint.inpaint_options",
+    "p3i.paint.npn.options",
+    "p3i.paint.extend_options",
 ]
 # Packages whose own file must be empty of imports, since importing any part of them runs it.
-BARE = ["p3i.cli", "p3i.grammar", "p3i.interp", "p3i.search", "p3i.vision", "p3i.paint"]
+BARE = ["p3i.cli", "p3i.grammar", "p3i.interp", "p3i.search", "p3i.vision", "p3i.paint", "p3i.paint.npn"]
 
 
 def module_of(path: Path) -> str:

@@ -9,6 +9,7 @@ from p3i.api.search import Progress, read_image, synth, without
 from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Program
 from p3i.language import load
+from p3i.paint.extend_options import ExtendOptions
 from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.options import RenderOptions
 from p3i.paint.points_options import PointsOptions
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from p3i.paint.draw import RenderedPicture
+    from p3i.paint.extend import Extended
     from p3i.paint.inpaint import Inpainted
     from p3i.paint.objects import Objects
     from p3i.paint.rectify import Rectified
@@ -172,6 +174,27 @@ def inpaint(
     seen = without(image, mask=mask, roi=None) if program is None else image
     _, found = _photo_and_program(seen, program, config, progress=progress)
     return fill(image, found, options, mask=mask, remove=remove, progress=progress, **changes)
+
+
+def extend(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None = None,
+    options: ExtendOptions | None = None,
+    *,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Extended":
+    """`photo` continued beyond its frame by `program`, or by the one that `synth` finds.
+
+    `changes` are fields of ExtendOptions, such as `by=parse_margins("10%,0,10%,0")`. The result has `pixels`,
+    `margins`, `paint()`, `save(path)`, `program`, `record()` and `notes`. Raises FileError, ParseError,
+    UsageError where the picture would reach the horizon, ProgramError and NoPatternError.
+    """
+    from p3i.paint.extend import extend as continue_photo
+
+    image, found = _photo_and_program(photo, program, config, progress=progress)
+    return continue_photo(image, found, options, progress=progress, **changes)
 
 
 def _photo_and_program(

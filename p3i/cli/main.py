@@ -32,6 +32,7 @@ COMMANDS: dict[str, Entry] = {
     "rectify": Entry("p3i.cli.rectify", "Straighten a photo by its program."),
     "tile": Entry("p3i.cli.tile", "Make a seamless texture of a photo\'s pattern."),
     "inpaint": Entry("p3i.cli.inpaint", "Fill a hole in a photo by its pattern."),
+    "extend": Entry("p3i.cli.extend", "Continue a photo beyond its frame by its pattern."),
     "points": Entry("p3i.cli.points", "List the objects: places, names, cells, and whether each is there."),
     "check": Entry("p3i.cli.check", "Report what is wrong, or odd, in programs."),
     "fmt": Entry("p3i.cli.fmt", "Rewrite programs in their canonical text."),

@@ -27,7 +27,7 @@ _MOST_SURROUNDING = 3000
 # The nearer to the hole, the more a place tells: weights fall to 1/e over this share of the margin.
 _FADING = 0.4
 # So many of the nearest objects are tried, and so many of the best kept, ...
-_MOST_TRIED = 80
+MOST_TRIED = 80
 _MOST_KEPT = 12
 # ... none with a misfit above this many times the best's; a source shows this much of hole and surroundings.
 _WORSE = 1.6
@@ -125,8 +125,11 @@ def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed) -> Hole:
     return Hole(target, points, around.astype(float), weights, colours, spacing)
 
 
-def sources(hole: Hole, ground: Ground, placed: Placed) -> list[Source]:
-    """The sources of a hole, the likest first; none where the program draws nothing like it in sight."""
+def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> list[Source]:
+    """The sources of a hole among the `most` nearest objects, the likest first.
+
+    There are none where the program draws nothing like it in sight.
+    """
     if not len(hole.around):
         return []
     pixels, _ = placed.centers_px()
@@ -134,7 +137,9 @@ def sources(hole: Hole, ground: Ground, placed: Placed) -> list[Source]:
     plane_moves = moves(placed, hole.target)
     usable = placed.in_sight() & np.isfinite(plane_moves).all((1, 2))
     usable[hole.target] = False
-    tried = [number for number in np.argsort(away) if usable[number]][:_MOST_TRIED]
+    # What is itself to be filled in its middle comes last: around a picture that grows there is much of it.
+    order = np.lexsort((away, ~ground.known(pixels)))
+    tried = [number for number in order if usable[number]][:most]
     plane_from_image = np.linalg.inv(placed.image_from_plane)
     probes = hole.points[:: max(1, len(hole.points) // _PROBES)]
     probes, _ = project(plane_from_image, probes)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from p3i.paint.cells import nearest
 from p3i.paint.placed import Placed
-from p3i.paint.sources import Ground, Hole, Source, hole_of, sources, taken
+from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, sources, taken
 from p3i.vision.fill import filled
 from p3i.vision.sheet import project
 
@@ -36,12 +36,18 @@ _SMOOTH = 0.125
 
 
 def fill_by_stack(
-    pixels: Floats, known: Mask, hole: Mask, placed: Placed, *, progress: Progress | None = None
+    pixels: Floats,
+    known: Mask,
+    hole: Mask,
+    placed: Placed,
+    *,
+    most_tried: int = MOST_TRIED,
+    progress: Progress | None = None,
 ) -> tuple[Floats, Mask]:
     """The photo with its hole filled, and where nothing like the hole was found [H, W].
 
     What is not `known` is no source, and is not filled either unless the hole holds it. Where no source shows
-    a pixel, the surroundings are continued smoothly.
+    a pixel, the surroundings are continued smoothly. Fewer objects tried for each piece is faster.
     """
     known = known & ~hole
     ground = Ground.of(pixels, known)
@@ -49,16 +55,18 @@ def fill_by_stack(
     result[hole] = 0
     context = known.copy()  # what the next piece is compared with: also what was filled before it
     bare = np.zeros_like(hole)
+    before = np.zeros_like(hole)  # what pieces next to the one in hand have been given
     pieces = _pieces(hole, known, placed)
     for done, points in enumerate(pieces):
         if progress is not None:
             progress("filling", done / len(pieces))
         one = hole_of(points, result, context, placed)
-        colours, seen = _filled(one, ground, sources(one, ground, placed))
+        colours, seen = _filled(one, ground, sources(one, ground, placed, most=most_tried), result, before)
         columns, rows = points.astype(int).T
         result[rows, columns] = colours
         bare[rows, columns] = ~seen
         context[rows[seen], columns[seen]] = True
+        before[rows[seen], columns[seen]] = True
     if bare.any():
         result[bare] = filled(result, context)[bare]
     return result, bare
@@ -92,13 +100,15 @@ def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
     return found
 
 
-def _filled(hole: Hole, ground: Ground, found: list[Source]) -> tuple[Floats, Mask]:
+def _filled(
+    hole: Hole, ground: Ground, found: list[Source], shown: Floats, before: Mask
+) -> tuple[Floats, Mask]:
     """The colours of a hole's pixels [N, 3], and which of them any source shows [N]."""
     if not found:
         return np.zeros((len(hole.points), 3), np.float32), np.zeros(len(hole.points), bool)
     weights = _weights(hole, ground, found)
     colours, weight = _mixed(hole.points, ground, found, weights, sharp=True)
-    return np.clip(colours + _carried(hole, ground, found, weights), 0, 1), weight > 1e-6
+    return np.clip(colours + _carried(hole, ground, found, weights, shown, before), 0, 1), weight > 1e-6
 
 
 def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
@@ -138,8 +148,13 @@ def _mixed(
     return (total / np.maximum(weight, 1e-9)[:, None]).astype(np.float32), weight
 
 
-def _carried(hole: Hole, ground: Ground, found: list[Source], weights: Array) -> Floats:
-    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [N, 3]."""
+def _carried(
+    hole: Hole, ground: Ground, found: list[Source], weights: Array, shown: Floats, before: Mask
+) -> Floats:
+    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [N, 3].
+
+    The rim is of the photo, and of what was filled `before` [H, W]; both are in `shown` [H, W, 3].
+    """
     margin = int(np.ceil(_RIM_PX)) + 1
     low = np.maximum(hole.points.min(0).astype(int) - margin, 0)
     width, height = (hole.points.max(0).astype(int) + margin + 1 - low).tolist()
@@ -148,16 +163,19 @@ def _carried(hole: Hole, ground: Ground, found: list[Source], weights: Array) ->
     inside[rows, columns] = 1
     distance = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
     known = np.zeros((height, width), bool)
-    part = ground.sure[low[1] : low[1] + height, low[0] : low[0] + width]
-    known[: part.shape[0], : part.shape[1]] = part > 0
+    window = (slice(low[1], low[1] + height), slice(low[0], low[0] + width))
+    part = (ground.sure[window] > 0) | before[window]
+    known[: part.shape[0], : part.shape[1]] = part
     rim_rows, rim_columns = np.nonzero((distance > 0) & (distance <= _RIM_PX) & known)
+    if not len(rim_rows):
+        return np.zeros((len(hole.points), 3), np.float32)
     rim = np.stack([rim_columns + low[0], rim_rows + low[1]], 1).astype(float)
     colours, weight = _mixed(rim, ground, found, weights, sharp=False)
     compared = weight > 0.3
     if not compared.any():
         return np.zeros((len(hole.points), 3), np.float32)
     rim_rows, rim_columns = rim_rows[compared], rim_columns[compared]
-    photo = ground.pixels[rim_rows + low[1], rim_columns + low[0]]
+    photo = shown[rim_rows + low[1], rim_columns + low[0]]
     off = np.clip(photo - colours[compared], -_MOST_CARRIED, _MOST_CARRIED)
     values, weighed = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
     values[rim_rows, rim_columns], weighed[rim_rows, rim_columns] = off, 1
