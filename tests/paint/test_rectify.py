@@ -115,7 +115,7 @@ def test_a_board_whose_lattice_runs_along_its_diagonals_stands_straight() -> Non
 
 
 def test_a_lattice_written_askew_stands_on_its_shortest_vectors() -> None:
-    askew = LATTICE.replace("8*i - 1.2*j + 1, y=1.2*i + 8*j", "8*i + 14.8*j + 1, y=1.2*i + 10.4*j")
+    askew = LATTICE.replace("8*i - 1.2*j + 1, y=1.2*i + 8*j", "14.8*i + 6.8*j + 1, y=10.4*i + 9.2*j")
     plain, skewed = (rectify(blank(), loads(text)).view.view_from_plane for text in (LATTICE, askew))
     turns = [np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0])) for matrix in (plain, skewed)]
     assert turns[0] == pytest.approx(turns[1], abs=1e-6)
