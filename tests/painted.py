@@ -9,7 +9,7 @@ from p3i import loads
 from p3i.paint.npn.gather import Stack, gather
 from p3i.paint.npn.lessons import lessons
 from p3i.paint.npn.paint import part_on_window
-from p3i.paint.npn.window import Bank, bank_of, window_of
+from p3i.paint.npn.window import Bank, Pyramid, bank_of, window_of
 from p3i.paint.placed import Placed, placed
 from p3i.vision.image import Image
 
@@ -66,7 +66,7 @@ def scene() -> Scene:
 def bank(found: Scene) -> tuple[Bank, np.ndarray]:
     """The scene's bank of windows, and its hole on the window."""
     window = window_of(found.placed, found.hole, working_px=48)
-    return bank_of(found.corrupted, found.placed, window), part_on_window(found.hole, window)
+    return bank_of(Pyramid(found.corrupted), found.placed, window), part_on_window(found.hole, window)
 
 
 def stacks(found: Scene, *, count: int = 24) -> tuple[Stack, list[Stack], list[Stack]]:

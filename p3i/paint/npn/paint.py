@@ -14,7 +14,7 @@ from p3i.paint.npn.lessons import batch_of, lessons
 from p3i.paint.npn.network import Painted, painted_all_ways, plain
 from p3i.paint.npn.options import NetworkOptions
 from p3i.paint.npn.training import EVERY, Progress, begun, threads, train
-from p3i.paint.npn.window import Bank, Window, bank_of, project, step_px, window_of
+from p3i.paint.npn.window import Bank, Pyramid, Window, bank_of, project, step_px, window_of
 from p3i.paint.placed import Placed
 from p3i.paint.stack import fill_by_stack
 from p3i.vision.image import Image
@@ -43,7 +43,7 @@ def paint(
         raise ValueError(f"the hole is bool {photo.valid.shape}, not {hole.dtype} {hole.shape}")
     device = _device(options.device)
     result, _ = fill_by_stack(photo.pixels, photo.valid, hole, placed)
-    corrupted = replace(photo, valid=photo.valid & ~hole)
+    pyramid = Pyramid(replace(photo, valid=photo.valid & ~hole))
     key = checkpoint.fingerprint(photo, placed, hole, options) if options.checkpoint else ""
     begin = time.monotonic()
     count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
@@ -52,7 +52,7 @@ def paint(
             part = labels == place
             until = None if options.time_s is None else begin + options.time_s * place / (count - 1)
             turn = _Turn(place, count - 1, key, until, device, progress)
-            change = _change(corrupted, placed, (part, result[part]), options, turn)
+            change = _change(pyramid, placed, (part, result[part]), options, turn)
             result[part] = np.clip(result[part] + change, 0, 1)
     return result
 
@@ -74,7 +74,7 @@ class _Turn:
 
 
 def _change(
-    photo: Image,
+    pyramid: Pyramid,
     placed: Placed,
     piece: tuple[np.ndarray, np.ndarray],
     options: NetworkOptions,
@@ -87,7 +87,7 @@ def _change(
     part, filled = piece
     nothing = np.zeros((int(part.sum()), 3), np.float32)
     window = window_of(placed, part, working_px=options.working_px)
-    bank = bank_of(photo, placed, window)
+    bank = bank_of(pyramid, placed, window)
     seen = part_on_window(part, window)
     stack = gather(bank, seen, most=options.sources)
     if stack is None:

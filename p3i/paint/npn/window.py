@@ -23,6 +23,8 @@ _MARGIN = 0.6
 _MOST_PX = 112
 # The network itself sees less: so much round the hole.
 _CORE_MARGIN = 0.2
+# Colours are carried so far into what is unknown.
+_SOFT_PX = 8
 # So many cells are looked at, the nearest first.
 _MOST_CELLS = 160
 
@@ -64,12 +66,19 @@ class Pyramid:
 
     def __init__(self, photo: Image) -> None:
         # Unknown pixels take the colour of their surroundings, or cubic reading would ring beside them.
-        pixels = photo.pixels.copy()
+        pixels = photo.pixels
         if not photo.valid.all():
-            soft = photo.valid.astype(np.float32)
+            pixels = pixels.copy()
+            rows, columns = np.nonzero(~photo.valid)
+            box = (
+                slice(max(0, rows.min() - _SOFT_PX), rows.max() + _SOFT_PX + 1),
+                slice(max(0, columns.min() - _SOFT_PX), columns.max() + _SOFT_PX + 1),
+            )
+            valid = photo.valid[box]
+            soft = valid.astype(np.float32)
             weight = cv2.GaussianBlur(soft, (0, 0), 2.0)[:, :, None]
-            mean = cv2.GaussianBlur(pixels * soft[:, :, None], (0, 0), 2.0) / np.maximum(weight, 1e-3)
-            pixels[~photo.valid] = mean[~photo.valid]
+            mean = cv2.GaussianBlur(pixels[box] * soft[:, :, None], (0, 0), 2.0) / np.maximum(weight, 1e-3)
+            pixels[box][~valid] = mean[~valid]
         self.known = cv2.erode(
             photo.valid.astype(np.uint8), np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE
         ).astype(np.float32)
@@ -154,9 +163,8 @@ def window_of(placed: Placed, hole: np.ndarray, *, working_px: int) -> Window:
     return Window(matrix, *size, scale, anchor, pitch * scale, (spans[0], spans[1]))
 
 
-def bank_of(photo: Image, placed: Placed, window: Window) -> Bank:
-    """The window as every cell in sight shows it; `photo.valid` says what is evidence."""
-    pyramid = Pyramid(photo)
+def bank_of(pyramid: Pyramid, placed: Placed, window: Window) -> Bank:
+    """The window as every cell in sight shows it, as far as the photo of the pyramid is evidence."""
     image_from_plane = placed.image_from_plane
     plane_from_image = np.linalg.inv(image_from_plane)
     laid = moves(placed, window.anchor)
