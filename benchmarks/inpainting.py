@@ -28,6 +28,7 @@ import p3i
 from p3i.evaluation.measures import measure
 from p3i.evaluation.truth import read_truth
 from p3i.paint.inpaint import inpaint
+from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.placed import Placed, placed
 from p3i.vision.image import Image
 
@@ -102,10 +103,8 @@ def fills(methods: list[str], *, steps: int) -> dict[str, Fill]:
     """The ways to fill, by name."""
 
     def ours(method: str) -> Fill:
-        options = {"steps": steps} if method == "npn" else {}
-        return lambda photo, program, hole: (
-            inpaint(photo, program, mask=hole, method=method, **options).pixels
-        )
+        asked = InpaintOptions(method=method, steps=steps)
+        return lambda photo, program, hole: inpaint(photo, program, asked, mask=hole).pixels
 
     def opencv(flag: int) -> Fill:
         def fill(photo: Image, _program: p3i.Program, hole: np.ndarray) -> np.ndarray:
@@ -136,13 +135,10 @@ def judged(photo: Image, filled: np.ndarray, hole: np.ndarray) -> tuple[float, f
     before, after = (np.rint(one.clip(0, 1) * 255) for one in (photo.pixels, filled))
     off = (before - after)[hole]
     rows, columns = np.nonzero(hole)
-    box = (
-        slice(rows.min(), max(rows.max() + 1, rows.min() + 7)),
-        slice(columns.min(), max(columns.max() + 1, columns.min() + 7)),
-    )
-    similar = structural_similarity(before[box], after[box], channel_axis=2, data_range=255)
+    down, across = (slice(int(at.min()), max(int(at.max()) + 1, int(at.min()) + 7)) for at in (rows, columns))
+    similar = structural_similarity(before[down, across], after[down, across], channel_axis=2, data_range=255)
     psnr = 10 * np.log10(255**2 / max(float((off**2).mean()), 1e-3))
-    return float(np.abs(off).mean()), float(psnr), float(similar)
+    return float(np.abs(off).mean()), float(psnr), float(np.asarray(similar))
 
 
 def main() -> None:
@@ -180,7 +176,7 @@ def main() -> None:
                 continue
             laid = placed(program, photo)
             for name, hole in holes(laid, np.random.default_rng([asked.seed, number])):
-                if asked.holes and name not in asked.holes:
+                if (asked.holes and name not in asked.holes) or not photo.valid[hole].all():
                     continue
                 hidden = np.where(hole[:, :, None], np.float32(0), photo.pixels)
                 given = dataclasses.replace(photo, pixels=hidden)
@@ -197,9 +193,9 @@ def main() -> None:
     print(f"\n{'method':18s} {'holes':>5s} {'L1':>7s} {'median':>7s} {'PSNR':>6s} {'SSIM':>6s} {'CPU s':>6s}")
     for method in ways:
         mine = [row for row in rows if row.method == method]
-        l1, psnr, ssim, cpu = (
-            np.array([getattr(row, name) for row in mine]) for name in ("l1", "psnr", "ssim", "cpu_s")
-        )
+        if not mine:
+            continue
+        l1, psnr, ssim, cpu = np.array([[row.l1, row.psnr, row.ssim, row.cpu_s] for row in mine]).T
         print(
             f"{method:18s} {len(mine):5d} {l1.mean():7.2f} {np.median(l1):7.2f} {psnr.mean():6.2f} "
             f"{ssim.mean():6.3f} {cpu.mean():6.2f}"
