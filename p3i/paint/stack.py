@@ -29,7 +29,7 @@ _MOST_CELLS = 9
 # How far the weights are drawn to the sources' own misfits: a share of the mean square of the residuals.
 _RIDGE = 0.3
 # The rim at which the fill is compared with the photo, in pixels, and the most that is carried in from there.
-_RIM_PX = 2.0
+_RIM_PX = 4.0
 _MOST_CARRIED = 0.15
 # What is carried in is smoothed along the rim over this share of the distance to the next object.
 _SMOOTH = 0.125
