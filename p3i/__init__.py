@@ -15,6 +15,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from p3i.api import (
+        edit,
         eval_set,
         examples,
         extend,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from p3i.grammar.ast import Program
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, loads
+    from p3i.paint.edit_options import EditOptions
     from p3i.paint.extend_options import ExtendOptions
     from p3i.paint.inpaint_options import InpaintOptions
     from p3i.paint.options import RenderOptions
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Camera": "p3i.interp.camera",
+    "EditOptions": "p3i.paint.edit_options",
     "FileError": "p3i.errors",
     "NoPatternError": "p3i.errors",
     "P3IError": "p3i.errors",
@@ -61,6 +64,7 @@ _HOMES = {
     "check": "p3i.language",
     "dump": "p3i.language",
     "dumps": "p3i.language",
+    "edit": "p3i.api",
     "examples": "p3i.api",
     "eval_set": "p3i.api",
     "expand": "p3i.language",
@@ -84,10 +88,11 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "score", "check",
+    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score", "check",
     "format", "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
     "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions", "PointsOptions",
     "ShowOptions", "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions",
+    "EditOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
 

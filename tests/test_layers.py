@@ -46,6 +46,7 @@ LIGHT += [
     "p3i.paint.inpaint_options",
     "p3i.paint.npn.options",
     "p3i.paint.extend_options",
+    "p3i.paint.edit_options",
 ]
 # Packages whose own file must be empty of imports, since importing any part of them runs it.
 BARE = ["p3i.cli", "p3i.grammar", "p3i.interp", "p3i.search", "p3i.vision", "p3i.paint", "p3i.paint.npn"]

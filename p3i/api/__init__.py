@@ -3,12 +3,12 @@
 Functions load what they need when they are called, so that importing this module costs nothing.
 """
 
-from p3i.api.pictures import extend, inpaint, points, rectify, render, show, tile
+from p3i.api.pictures import edit, extend, inpaint, points, rectify, render, show, tile
 from p3i.api.search import Polygon, Progress, Trace, eval_set, examples, read_image, score, synth, trace
 from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "score", "check", "format",
-    "expand", "examples", "trace", "eval_set",
+    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score", "check",
+    "format", "expand", "examples", "trace", "eval_set",
     "load", "load_sketch", "loads", "dump", "dumps", "read_image", "Polygon", "Progress", "Trace",
 ]  # fmt: skip

@@ -9,6 +9,7 @@ from p3i.api.search import Progress, read_image, synth, without
 from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Program
 from p3i.language import load
+from p3i.paint.edit_options import EditOptions
 from p3i.paint.extend_options import ExtendOptions
 from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.options import RenderOptions
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from p3i.paint.draw import RenderedPicture
+    from p3i.paint.edit import Edited
     from p3i.paint.extend import Extended
     from p3i.paint.inpaint import Inpainted
     from p3i.paint.objects import Objects
@@ -195,6 +197,29 @@ def extend(
 
     image, found = _photo_and_program(photo, program, config, progress=progress)
     return continue_photo(image, found, options, progress=progress, **changes)
+
+
+def edit(
+    photo: "str | os.PathLike[str] | Image",
+    old: Program | str | os.PathLike[str] | None,
+    new: Program | str | os.PathLike[str],
+    options: EditOptions | None = None,
+    *,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Edited":
+    """`photo` with the objects of the program `old` laid anew as the program `new` says.
+
+    Where `old` is None, it is the program that `synth` finds. `changes` are fields of EditOptions. The result
+    has `pixels`, `touched`, `kept`, `removed`, `added`, `paint()`, `save(path)` and `notes`. Raises
+    FileError, ParseError, UsageError, ProgramError for a program without objects, and NoPatternError.
+    """
+    from p3i.paint.edit import edit as lay_anew
+
+    wanted = new if isinstance(new, Program) else load(Path(new))
+    image, found = _photo_and_program(photo, old, config, progress=progress)
+    return lay_anew(image, found, wanted, options, **changes)
 
 
 def _photo_and_program(

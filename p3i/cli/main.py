@@ -33,6 +33,7 @@ COMMANDS: dict[str, Entry] = {
     "tile": Entry("p3i.cli.tile", "Make a seamless texture of a photo\'s pattern."),
     "inpaint": Entry("p3i.cli.inpaint", "Fill a hole in a photo by its pattern."),
     "extend": Entry("p3i.cli.extend", "Continue a photo beyond its frame by its pattern."),
+    "edit": Entry("p3i.cli.edit", "Lay a photo's objects anew by a changed program."),
     "points": Entry("p3i.cli.points", "List the objects: places, names, cells, and whether each is there."),
     "check": Entry("p3i.cli.check", "Report what is wrong, or odd, in programs."),
     "fmt": Entry("p3i.cli.fmt", "Rewrite programs in their canonical text."),

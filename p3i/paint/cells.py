@@ -50,6 +50,22 @@ def moves(placed: Placed, target: int) -> Array:
     return found
 
 
+def frames(placed: Placed) -> Array:
+    """The maps [M, 3, 3] that lay the plane about the origin, as it stands, upon each object.
+
+    Nothing turns in a lattice; on rings the upright points outwards, as at the top of a clock.
+    """
+    turns = _turns_rad(placed)
+    if isinstance(nest(placed.pattern.program).draw.x, Polar):
+        turns = turns + np.pi / 2
+    found = np.tile(np.eye(3), (len(turns), 1, 1))
+    found[:, 0, 0] = found[:, 1, 1] = np.cos(turns)
+    found[:, 1, 0] = np.sin(turns)
+    found[:, 0, 1] = -found[:, 1, 0]
+    found[:, :2, 2] = placed.points
+    return found
+
+
 def pitch_px(placed: Placed, target: int) -> float:
     """How far the nearest other object lies from object `target` on the photo, in pixels, at least 2."""
     pixels, front = placed.centers_px()
