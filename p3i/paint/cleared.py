@@ -23,10 +23,14 @@ Mask = NDArray[np.bool_]
 
 # What is cleared reaches this far beyond an object, in its radii: edges are blurred, and objects slip.
 _WIDER = 0.12
-_LEAST_ALPHA = 0.08
+# Of the ground between an object and its cell's border, they take this share at most.
+_OF_ROOM = 0.3
+_LEAST_ALPHA = 0.1
 # The ground's light is smooth over this share of a cell; it needs so many rounds to come under an object.
 _BLUR = 0.12
 _DIFFUSIONS = 12
+# Texture is faint; what differs more from the light of the ground is another thing that lies there.
+_MOST_TEXTURE = 0.08
 
 
 def windows(placed: Placed, cut: Cutout, *, scale: float = 1.0) -> list[tuple[slice, slice] | None]:
@@ -67,8 +71,9 @@ def object_masks(
     return found
 
 
-def covered(placed: Placed, cut: Cutout, *, wider: float = 1.0 + _WIDER) -> Mask:
+def covered(placed: Placed, cut: Cutout) -> Mask:
     """The pixels that objects cover, with a little around them: [H, W]."""
+    wider = 1 + min(_WIDER, _OF_ROOM * cut.room / max(0.5 - cut.room, 0.05))
     mask = np.zeros((placed.size.height, placed.size.width), bool)
     for window, alpha in object_masks(placed, cut, wider=wider):
         mask[window] |= alpha > _LEAST_ALPHA
@@ -90,7 +95,9 @@ def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask, cut: Cut
         under = np.where(ground[:, :, None], even, cv2.GaussianBlur(under, (0, 0), sigma))
     detail = np.where(ground[:, :, None], pixels - even, np.float32(0))
     texture = _texture(detail, ground, placed, objects)
-    return np.where(objects[:, :, None], np.clip(under + texture, 0, 1), pixels).astype(np.float32)
+    return np.where(
+        objects[:, :, None], np.clip(under + np.clip(texture, -_MOST_TEXTURE, _MOST_TEXTURE), 0, 1), pixels
+    ).astype(np.float32)
 
 
 def _texture(detail: Floats, ground: Mask, placed: Placed, objects: Mask) -> Floats:

@@ -2,7 +2,7 @@
 
 The cells of all objects are laid onto one another by the program's own frames (cells.py), brought to one
 light, and their median taken. The cell's border, as far from objects as places are, shows the ground;
-continued smoothly into the cell it is what would lie under the object, and what differs from it is the object.
+continued smoothly into the cell it is what would lie under the object, and what differs is the object.
 
 Convention: a cell is sampled on a square grid about its object, `side` x `side` places, `step` program units
 apart; RGB in 0..1.
@@ -39,6 +39,9 @@ _LEAST_CONTRAST = 4.0
 _DEVIATIONS = 2.0
 # An object is at least this share of its cell, and at most that.
 _LEAST_SHARE, _MOST_SHARE = 0.01, 0.92
+# Parts of fewer places are noise; what stays within the cell is its object, if it is this share of all.
+_LEAST_PART = 6
+_LOOSE_SHARE = 0.15
 # Where no object stands out, the middle of the cell is taken for it, this far, in distances.
 _ASSUMED = 0.36
 
@@ -69,6 +72,8 @@ class Levels:
 class Cutout:
     """The object of a program's cells: `alpha` float32 [side, side], 1 on it, soft at its edge.
 
+    `room` is how much ground lies between it and the cell's border, where they are closest, in distances.
+
     `step` is the grid's distance in program units; `mean` [side, side, 3] the median cell; `misfit` [M] how
     far each object of the program is from it, inf for those not seen wholly. `clear` says whether the object
     stood out from its ground.
@@ -79,6 +84,7 @@ class Cutout:
     step: float
     misfit: Array
     clear: bool
+    room: float
 
     @property
     def radius(self) -> float:
@@ -105,7 +111,7 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     half = (_SIDE - 1) // 2
     step = _REACH * spacing / half
     line = (np.arange(_SIDE) - half) * step
-    local = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2)
+    local: Array = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2).astype(np.float64)
     own = _own_ground(placed, local, spacing)
     cells, seen = _cells(placed, photo, local)
     whole = seen[:, own.ravel() > 0].mean(1) > 0.98
@@ -124,7 +130,8 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     if alpha is None:
         reach = np.hypot(local[:, 0], local[:, 1]).reshape(_SIDE, _SIDE)
         alpha = np.clip((_ASSUMED * spacing - reach) / (0.05 * spacing) + 0.5, 0, 1).astype(np.float32)
-    return Cutout(alpha, mean, step, misfit, clear)
+    room = max(0.0, float(own[alpha > 0.5].min(initial=0.5)))
+    return Cutout(alpha, mean, step, misfit, clear, room)
 
 
 def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:
@@ -184,23 +191,45 @@ def _segmented(mean: Floats, spread: Floats, own: Array, spacing: float) -> Floa
     under = filled(colours, ground)
     under = cv2.GaussianBlur(under, (0, 0), 0.06 * spacing)
     apart = np.sqrt(((colours - under) ** 2).sum(2))
-    noise = float(np.median(apart[ground]))
+    # Ground that differs much within the border, or from cell to cell, is none.
+    noise = max(float(np.median(apart[ground])), 100 * float(np.median(spread[ground])))
     inner = own > 0
     level = _divide(apart[inner])
     if level < max(_LEAST_CONTRAST, _DEVIATIONS * noise):
         return None
     core = ((apart > level) & inner).astype(np.uint8)
     core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
-    # Holes of an object belong to it: what cannot be reached from the border.
-    _, labels = cv2.connectedComponents(1 - core, connectivity=4)
-    outside = np.unique(labels[own <= 0])
-    whole = ~np.isin(labels, outside[outside > 0]) | (core > 0)
+    whole = _hull(_loose(core, own * spacing)) & inner
     share = float((whole & inner).sum() / inner.sum())
     if not _LEAST_SHARE <= share <= _MOST_SHARE:
         return None
     # A soft edge, two places wide, within the cell.
     soft = cv2.GaussianBlur(whole.astype(np.float32), (0, 0), 0.8)
     return (soft * np.clip(own * spacing + 1, 0, 1)).astype(np.float32)
+
+
+def _loose(core: NDArray, depth: Array) -> Mask:
+    """The parts that do not run on over the border of the cell, `depth` places away; all, if none is left.
+
+    What does run on, as the rim of a clock does behind its numbers, is no object of this cell alone.
+    """
+    count, labels = cv2.connectedComponents(core, connectivity=8)
+    kept = np.zeros(core.shape, bool)
+    for label in range(1, count):
+        part = labels == label
+        if depth[part].min() > 1.5 and part.sum() >= _LEAST_PART:
+            kept |= part
+    return kept if kept.sum() >= _LOOSE_SHARE * core.sum() else core > 0
+
+
+def _hull(mask: Mask) -> Mask:
+    """The convex hull of a mask: what lies in an object's bays and holes goes with it."""
+    rows, columns = np.nonzero(mask)
+    filled_hull = np.zeros(mask.shape, np.uint8)
+    if len(rows):
+        corners = cv2.convexHull(np.stack([columns, rows], 1).astype(np.int32))
+        cv2.fillConvexPoly(filled_hull, corners, 1)
+    return filled_hull > 0
 
 
 def _divide(values: Array) -> float:
