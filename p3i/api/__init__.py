@@ -3,9 +3,14 @@
 Functions load what they need when they are called, so that importing this module costs nothing.
 """
 
+from typing import TYPE_CHECKING
+
 from p3i.api.pictures import edit, extend, inpaint, points, rectify, render, show, tile
 from p3i.api.search import Polygon, Progress, Trace, eval_set, examples, read_image, score, synth, trace
 from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
+
+if TYPE_CHECKING:
+    from p3i.evaluation.score_set import SetScore as SetScore
 
 __all__ = [  # noqa: RUF022  # in the order of use
     "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score", "check",

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,9 +11,6 @@ from p3i import api, files
 from p3i.cli import options, progress, search_options
 from p3i.cli.synth import FOCAL
 from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, sentence
-
-if TYPE_CHECKING:
-    from p3i.evaluation.score_set import SetScore
 
 # The columns of the two tables: a key of the row or of the summary, its heading, how its value is printed.
 _PHOTO = (
@@ -84,7 +81,7 @@ def command(
             stream.write(json.dumps(score.as_json(), indent=1) + "\n")
 
 
-def _print(score: "SetScore") -> None:
+def _print(score: "api.SetScore") -> None:
     """Both tables on stdout, and what the search cost."""
     from rich.console import Console
 
