@@ -30,7 +30,7 @@ COMMANDS: dict[str, Entry] = {
     "show": Entry("p3i.cli.show", "Draw a program over its photo, to see whether it is right."),
     "render": Entry("p3i.cli.render", "Draw a program as PNG, SVG or PDF, also over its photo."),
     "rectify": Entry("p3i.cli.rectify", "Straighten a photo by its program."),
-    "tile": Entry("p3i.cli.tile", "Make a seamless texture of a photo\'s pattern."),
+    "tile": Entry("p3i.cli.tile", "Make a seamless texture of a photo's pattern."),
     "inpaint": Entry("p3i.cli.inpaint", "Fill a hole in a photo by its pattern."),
     "extend": Entry("p3i.cli.extend", "Continue a photo beyond its frame by its pattern."),
     "edit": Entry("p3i.cli.edit", "Lay a photo's objects anew by a changed program."),

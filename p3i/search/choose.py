@@ -75,7 +75,7 @@ def by_explained(
 
     Every answer's `worth` becomes what it explains. Within a family the order stays, since that family knows
     its own programs best; what is no answer (a score below `needed`, or no bits) stands in no other's way. A
-    hybrid that holds a ring, drawing its objects and more, says all that the ring says, and is measured by it:
+    hybrid that holds a ring, drawing its objects and more, says all that the ring says, measured by it:
     it is worth what the ring is, and what its further objects explain beyond its higher cost.
     """
     told = [[(answer, explained(evidence, answer)) for answer in family] for family in answers]
