@@ -23,7 +23,7 @@ from p3i.paint.cleared import cleared, covered, local_points, object_masks, wind
 from p3i.paint.cutout import Cutout, Levels, cutout
 from p3i.paint.edit_options import EditOptions
 from p3i.paint.outlines import chart_of, pitch
-from p3i.paint.picture import Picture, depth, opacity
+from p3i.paint.picture import Picture, opacity, repainted
 from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.rectify_options import changed
 from p3i.vision.image import Image
@@ -59,13 +59,7 @@ class Edited:
 
     def paint(self) -> Picture:
         """The picture in the photo's depth, as transparent as it was."""
-        bits = depth(self.photo)
-        top = 2**bits - 1
-        kind = np.uint8 if bits == 8 else np.uint16
-        alpha = opacity(self.photo)
-        alpha = None if alpha is None else np.rint(alpha * top).astype(kind)
-        values = np.rint(self.pixels.clip(0, 1) * top).astype(kind)
-        return Picture(values, alpha, self.photo.source.icc, self.photo.source.exif)
+        return repainted(self.photo, self.pixels, alpha=opacity(self.photo))
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""

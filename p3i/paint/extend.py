@@ -27,7 +27,7 @@ from p3i.grammar.printer import format_program
 from p3i.paint.continued import Continued, continued, widened
 from p3i.paint.extend_options import SIDES, ExtendOptions, Margins
 from p3i.paint.outlines import chart_of, polygons
-from p3i.paint.picture import Picture, depth, opacity
+from p3i.paint.picture import Picture, opacity, repainted
 from p3i.paint.placed import Placed, placed
 from p3i.paint.rectify_options import changed
 from p3i.paint.stack import fill_by_stack
@@ -75,16 +75,11 @@ class Extended:
 
     def paint(self) -> Picture:
         """The picture in the photo's depth; what was transparent in the photo still is."""
-        bits = depth(self.photo)
-        top = 2**bits - 1
-        kind = np.uint8 if bits == 8 else np.uint16
         alpha = opacity(self.photo)
-        if alpha is not None:
-            wide = np.ones(self.pixels.shape[:2], np.float32)
+        wide = None if alpha is None else np.ones(self.pixels.shape[:2], np.float32)
+        if wide is not None:
             wide[_window(self.margins, self.photo.size)] = alpha
-            alpha = np.rint(wide * top).astype(kind)
-        values = np.rint(self.pixels.clip(0, 1) * top).astype(kind)
-        return Picture(values, alpha, self.photo.source.icc, self.photo.source.exif)
+        return repainted(self.photo, self.pixels, alpha=wide)
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""

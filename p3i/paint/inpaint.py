@@ -20,7 +20,7 @@ from p3i.grammar.ast import Program
 from p3i.interp.lens import straight_from_photo
 from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.objects import objects_of
-from p3i.paint.picture import Picture, depth, opacity
+from p3i.paint.picture import Picture, opacity, repainted
 from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.points_options import PointsOptions
 from p3i.paint.rectify_options import changed
@@ -52,15 +52,9 @@ class Inpainted:
 
     def paint(self) -> Picture:
         """The picture in the photo's depth; where the hole was transparent it is so no longer."""
-        bits = depth(self.photo)
-        top = 2**bits - 1
-        kind = np.uint8 if bits == 8 else np.uint16
         alpha = opacity(self.photo)
-        if alpha is not None:
-            alpha = np.where(self.hole, np.float32(1), alpha)
-            alpha = None if (alpha == 1).all() else np.rint(alpha * top).astype(kind)
-        values = np.rint(self.pixels.clip(0, 1) * top).astype(kind)
-        return Picture(values, alpha, self.photo.source.icc, self.photo.source.exif)
+        alpha = None if alpha is None else np.where(self.hole, np.float32(1), alpha)
+        return repainted(self.photo, self.pixels, alpha=alpha)
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""

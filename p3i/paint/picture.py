@@ -94,6 +94,23 @@ def opacity(photo: Image) -> np.ndarray | None:
     return None if photo.valid.all() else photo.valid.astype(np.float32)
 
 
+def repainted(photo: Image, pixels: np.ndarray, *, alpha: np.ndarray | None) -> Picture:
+    """Pixels float [H, W, 3] in 0..1 as a picture in the photo's depth, with its profile and EXIF.
+
+    `alpha` is float [H, W] in 0..1; None, or 1 everywhere, leaves it out.
+    """
+    top = 2 ** depth(photo) - 1
+    kind = np.uint8 if top == 255 else np.uint16
+    if alpha is not None and (alpha == 1).all():
+        alpha = None
+    return Picture(
+        np.rint(pixels.clip(0, 1) * top).astype(kind),
+        None if alpha is None else np.rint(alpha * top).astype(kind),
+        photo.source.icc,
+        photo.source.exif,
+    )
+
+
 def _on_white(values: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     top = np.iinfo(values.dtype).max
     share = alpha.astype(np.float32)[:, :, None] / top
