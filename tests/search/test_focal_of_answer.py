@@ -1,5 +1,6 @@
 """An answer may be told with a focal of its own; centres, header and record follow it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from p3i import api
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search import synthesize as synthesis
 from p3i.search.config import SearchConfig
+from p3i.search.evidence import Evidence
 from p3i.search.record import answer_record
 from p3i.search.session import Answer, Session
 from p3i.search.sketches import Family
@@ -29,7 +31,12 @@ def with_answers(monkeypatch: pytest.MonkeyPatch, *answers: Answer) -> None:
     def find(session: Session) -> list[Answer]:
         return list(answers)
 
+    def as_found(_evidence: Evidence, found: Sequence[Sequence[Answer]], *, needed: float) -> list[Answer]:
+        return [answer for family in found for answer in family if answer.score >= needed]
+
     monkeypatch.setattr(synthesis, "FAMILIES", (Family("lattice", find),))
+    # The picture is noise, which no program explains: what an answer is worth is as the test says.
+    monkeypatch.setattr(synthesis, "by_explained", as_found)
 
 
 def test_an_answer_with_its_own_focal_is_told_with_it(image: Image, monkeypatch) -> None:
