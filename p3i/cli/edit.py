@@ -9,7 +9,9 @@ from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
 from p3i.paint.edit_options import EditOptions, parse_scale
-from p3i.paint.rectify_options import sentence
+from p3i.records import told
+
+sentence, _ = told(EditOptions)
 
 
 @click.command("edit", short_help="Lay a photo's objects anew by a changed program.")
@@ -20,8 +22,8 @@ from p3i.paint.rectify_options import sentence
 @kind_option
 @json_option
 @options.force
-@click.option("--scale", metavar="auto|S", default="auto", help=sentence(EditOptions, "scale"))
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence(EditOptions, "focal_mm"))
+@click.option("--scale", metavar="auto|S", default="auto", help=sentence("scale"))
+@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @options.quiet
 @options.verbose
 @options.error_format

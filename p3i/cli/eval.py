@@ -10,7 +10,10 @@ import click
 from p3i import api, files
 from p3i.cli import options, progress, search_options
 from p3i.cli.synth import FOCAL
-from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig, default, sentence
+from p3i.records import told
+from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig
+
+sentence, default = told(SearchConfig)
 
 # The columns of the two tables: a key of the row or of the summary, its heading, how its value is printed.
 _PHOTO = (
@@ -37,13 +40,24 @@ _GROUP = (
 @click.option("--only", metavar="TEXT", help="Only photos whose name contains this.")
 @click.option("--limit", type=int, metavar="N", help="Only the first N photos.")
 @click.option("--structure", metavar="|".join(STRUCTURES), default="auto", help=sentence("structure"))
-@click.option("--extent", type=click.Choice(EXTENTS), default=default("extent"), help=sentence("extent"))
+@click.option(
+    "--extent",
+    type=click.Choice(EXTENTS),
+    default=default("extent"),
+    help=sentence("extent"),
+)
 @click.option("--focal", "focal_mm", type=FOCAL, metavar=FOCAL.name, help=sentence("focal_mm"))
 @search_options.features
 @search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@click.option("--seed", type=int, default=default("seed"), show_default=True, help=sentence("seed"))
+@click.option(
+    "--seed",
+    type=int,
+    default=default("seed"),
+    show_default=True,
+    help=sentence("seed"),
+)
 @search_options.device
 @search_options.threads
 @options.quiet

@@ -9,7 +9,9 @@ from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
 from p3i.paint.extend_options import ExtendOptions, parse_margins
-from p3i.paint.rectify_options import default, sentence
+from p3i.records import told
+
+sentence, default = told(ExtendOptions)
 
 
 @click.command("extend", short_help="Continue a photo beyond its frame by its pattern.")
@@ -19,7 +21,7 @@ from p3i.paint.rectify_options import default, sentence
 @kind_option
 @json_option
 @options.force
-@click.option("--by", metavar="N%|N|L,T,R,B", help=sentence(ExtendOptions, "by"))
+@click.option("--by", metavar="N%|N|L,T,R,B", help=sentence("by"))
 @click.option(
     "--cells", metavar="N|L,T,R,B", help="How many more cells to each side, counted at the sides' middles."
 )
@@ -27,11 +29,11 @@ from p3i.paint.rectify_options import default, sentence
     "--max-px",
     type=int,
     metavar="N",
-    default=default(ExtendOptions, "max_px"),
+    default=default("max_px"),
     show_default=True,
-    help=sentence(ExtendOptions, "max_px"),
+    help=sentence("max_px"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence(ExtendOptions, "focal_mm"))
+@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @options.quiet
 @options.verbose
 @options.error_format
@@ -46,7 +48,7 @@ def command(**given: Any) -> None:
         raise UsageError("only one input can be standard input")
     if given["by"] is not None and given["cells"] is not None:
         raise UsageError("--by and --cells both say how far: give one of them")
-    by = default(ExtendOptions, "by")
+    by = default("by")
     for option in ("by", "cells"):
         if given[option] is not None:
             by = parse_margins(given[option], option=f"--{option}")

@@ -11,11 +11,9 @@ from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, kind_option
 from p3i.errors import UsageError
 from p3i.paint.inpaint_options import METHODS, InpaintOptions
-from p3i.paint.rectify_options import default, sentence
+from p3i.records import told
 
-
-def _sentence(name: str) -> str:
-    return sentence(InpaintOptions, name)
+sentence, default = told(InpaintOptions)
 
 
 @click.command("inpaint", short_help="Fill a hole in a photo by its pattern.")
@@ -34,34 +32,41 @@ def _sentence(name: str) -> str:
 @click.option(
     "--method",
     type=click.Choice(METHODS),
-    default=default(InpaintOptions, "method"),
+    default=default("method"),
     show_default=True,
-    help=_sentence("method"),
+    help=sentence("method"),
 )
 @click.option(
     "--steps",
     type=int,
     metavar="N",
-    default=default(InpaintOptions, "steps"),
+    default=default("steps"),
     show_default=True,
-    help=_sentence("steps"),
+    help=sentence("steps"),
 )
-@click.option("--time", "time_s", type=float, metavar="SECONDS", help=_sentence("time_s"))
-@click.option("--checkpoint", type=click.Path(), metavar="FILE", help=_sentence("checkpoint"))
+@click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
+@click.option("--checkpoint", type=click.Path(), metavar="FILE", help=sentence("checkpoint"))
 @click.option(
-    "--seed", type=int, default=default(InpaintOptions, "seed"), show_default=True, help=_sentence("seed")
+    "--seed",
+    type=int,
+    default=default("seed"),
+    show_default=True,
+    help=sentence("seed"),
 )
 @click.option(
-    "--device", default=default(InpaintOptions, "device"), show_default=True, help=_sentence("device")
+    "--device",
+    default=default("device"),
+    show_default=True,
+    help=sentence("device"),
 )
 @click.option(
     "--threads",
     type=int,
-    default=default(InpaintOptions, "threads"),
+    default=default("threads"),
     show_default=True,
-    help=_sentence("threads"),
+    help=sentence("threads"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=_sentence("focal_mm"))
+@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @options.quiet
 @options.verbose
 @options.error_format

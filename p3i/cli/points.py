@@ -12,8 +12,11 @@ from p3i import api, files
 from p3i.cli import options, photos, progress, report
 from p3i.cli.render import SizeType
 from p3i.errors import P3IError, UsageError
-from p3i.paint.points_options import FORMATS, PointsOptions, default, format_of, sentence
+from p3i.paint.points_options import FORMATS, PointsOptions, format_of
+from p3i.records import told
 from p3i.size import Size
+
+sentence, default = told(PointsOptions)
 
 UNEXPECTED = 1
 """The exit code where `--expect` does not hold: like `fmt --check`, a check was asked for and it says no."""
@@ -34,7 +37,13 @@ _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
 )
 @options.force
 @click.option("--image", metavar="PHOTO", help="The photo of the program: says which objects are there.")
-@click.option("--size", type=SizeType(), metavar="WxH", default=default("size"), help=sentence("size"))
+@click.option(
+    "--size",
+    type=SizeType(),
+    metavar="WxH",
+    default=default("size"),
+    help=sentence("size"),
+)
 @click.option(
     "--min-presence",
     type=float,
@@ -42,9 +51,21 @@ _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
     default=default("min_presence"),
     help=sentence("min_presence"),
 )
-@click.option("--all", "outside", is_flag=True, default=default("outside"), help=sentence("outside"))
+@click.option(
+    "--all",
+    "outside",
+    is_flag=True,
+    default=default("outside"),
+    help=sentence("outside"),
+)
 @click.option("--clip", is_flag=True, default=default("clip"), help=sentence("clip"))
-@click.option("--label", metavar="WORD", default=default("label"), show_default=True, help=sentence("label"))
+@click.option(
+    "--label",
+    metavar="WORD",
+    default=default("label"),
+    show_default=True,
+    help=sentence("label"),
+)
 @click.option(
     "--expect",
     type=SizeType(),

@@ -9,11 +9,10 @@ from p3i import api
 from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
-from p3i.paint.rectify_options import CROPS, RectifyOptions, default, parse_cell, sentence
+from p3i.paint.rectify_options import CROPS, RectifyOptions, parse_cell
+from p3i.records import told
 
-
-def _sentence(name: str) -> str:
-    return sentence(RectifyOptions, name)
+sentence, default = told(RectifyOptions)
 
 
 @click.command("rectify", short_help="Straighten a photo by its program.")
@@ -26,34 +25,34 @@ def _sentence(name: str) -> str:
 @click.option(
     "--crop",
     type=click.Choice(CROPS),
-    default=default(RectifyOptions, "crop"),
+    default=default("crop"),
     show_default=True,
-    help=_sentence("crop"),
+    help=sentence("crop"),
 )
-@click.option("--scale", type=float, metavar="S", help=_sentence("scale"))
+@click.option("--scale", type=float, metavar="S", help=sentence("scale"))
 @click.option(
     "--max-px",
     type=int,
     metavar="N",
-    default=default(RectifyOptions, "max_px"),
+    default=default("max_px"),
     show_default=True,
-    help=_sentence("max_px"),
+    help=sentence("max_px"),
 )
-@click.option("--cell", metavar="WxHmm", help=_sentence("cell"))
+@click.option("--cell", metavar="WxHmm", help=sentence("cell"))
 @click.option(
     "--upright/--as-seen",
-    default=default(RectifyOptions, "upright"),
+    default=default("upright"),
     show_default=True,
-    help=_sentence("upright"),
+    help=sentence("upright"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=_sentence("focal_mm"))
+@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @click.option(
     "--back",
     metavar="EDITED",
     type=click.Path(),
     help="Write the photo instead, with what was edited in this picture of the same view.",
 )
-@click.option("--tolerance", type=float, metavar="T", help=_sentence("tolerance"))
+@click.option("--tolerance", type=float, metavar="T", help=sentence("tolerance"))
 @options.quiet
 @options.verbose
 @options.error_format

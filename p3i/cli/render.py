@@ -13,8 +13,11 @@ import click
 from p3i import api, files
 from p3i.cli import options, report
 from p3i.errors import P3IError, UsageError
-from p3i.paint.options import KINDS, RenderOptions, default, kind_of, sentence
+from p3i.paint.options import KINDS, RenderOptions, kind_of
+from p3i.records import told
 from p3i.size import Size
+
+sentence, default = told(RenderOptions)
 
 _SUFFIXES = frozenset({".p3p"})
 _POLL_S = 0.2
@@ -48,11 +51,26 @@ class SizeType(click.ParamType):
 @click.option("--image", metavar="PHOTO", help="Draw over this photo.")
 @click.option("--sprite", metavar="FILE", help="A picture to stand at each object, warped by the camera.")
 @click.option("--sprite-units", type=float, metavar="U", help=sentence("sprite_units"))
-@click.option("--size", type=SizeType(), metavar="WxH", default=default("size"), help=sentence("size"))
+@click.option(
+    "--size",
+    type=SizeType(),
+    metavar="WxH",
+    default=default("size"),
+    help=sentence("size"),
+)
 @click.option("--plane", is_flag=True, default=default("plane"), help=sentence("plane"))
-@click.option("--markers/--no-markers", default=default("markers"), help=sentence("markers"))
+@click.option(
+    "--markers/--no-markers",
+    default=default("markers"),
+    help=sentence("markers"),
+)
 @click.option("--cells/--no-cells", default=default("cells"), help=sentence("cells"))
-@click.option("--horizon", is_flag=True, default=default("horizon"), help=sentence("horizon"))
+@click.option(
+    "--horizon",
+    is_flag=True,
+    default=default("horizon"),
+    help=sentence("horizon"),
+)
 @click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @click.option(
     "--max-px",

@@ -3,7 +3,10 @@
 import click
 
 from p3i.cli.options import Decorator
-from p3i.search.config import default, sentence
+from p3i.records import told
+from p3i.search.config import SearchConfig
+
+sentence, default = told(SearchConfig)
 
 features: Decorator = click.option(
     "--features",
@@ -18,11 +21,18 @@ weights: Decorator = click.option("--weights", type=click.Path(), metavar="FILE"
 """`--weights FILE`."""
 
 device: Decorator = click.option(
-    "--device", default=default("device"), show_default=True, help=sentence("device")
+    "--device",
+    default=default("device"),
+    show_default=True,
+    help=sentence("device"),
 )
 """`--device NAME`."""
 
 threads: Decorator = click.option(
-    "--threads", type=int, default=default("threads"), show_default=True, help=sentence("threads")
+    "--threads",
+    type=int,
+    default=default("threads"),
+    show_default=True,
+    help=sentence("threads"),
 )
 """`--threads N`."""

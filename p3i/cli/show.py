@@ -10,7 +10,10 @@ import click
 from p3i import api, files
 from p3i.cli import options, progress, report
 from p3i.errors import UsageError
-from p3i.paint.show_options import KINDS, LABELS, ShowOptions, default, kind_of, sentence
+from p3i.paint.show_options import KINDS, LABELS, ShowOptions, kind_of
+from p3i.records import told
+
+sentence, default = told(ShowOptions)
 
 
 @click.command("show", short_help="Draw the program over its photo: objects, cells, names, horizon, extent.")
@@ -36,9 +39,18 @@ from p3i.paint.show_options import KINDS, LABELS, ShowOptions, default, kind_of,
 @click.option("--cells/--no-cells", default=default("cells"), help=sentence("cells"))
 @click.option("--horizon/--no-horizon", default=default("horizon"), help=sentence("horizon"))
 @click.option("--extent/--no-extent", default=default("extent"), help=sentence("extent"))
-@click.option("--presence/--no-presence", default=default("presence"), help=sentence("presence"))
 @click.option(
-    "--longer", type=int, metavar="N", default=default("longer"), show_default=True, help=sentence("longer")
+    "--presence/--no-presence",
+    default=default("presence"),
+    help=sentence("presence"),
+)
+@click.option(
+    "--longer",
+    type=int,
+    metavar="N",
+    default=default("longer"),
+    show_default=True,
+    help=sentence("longer"),
 )
 @click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @options.quiet

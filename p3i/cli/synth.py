@@ -15,8 +15,11 @@ from p3i import api, files
 from p3i.cli import options, progress, report, search_options
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
-from p3i.search.config import EXTENTS, RECIPES, STRUCTURES, SearchConfig, default, sentence
+from p3i.records import told
+from p3i.search.config import EXTENTS, RECIPES, STRUCTURES, SearchConfig
 from p3i.search.result import Candidate, StopReason, SynthesisResult
+
+sentence, default = told(SearchConfig)
 
 
 class NumberOrWord(click.ParamType):
@@ -89,8 +92,21 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 @search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@click.option("--top", type=int, metavar="K", default=default("top"), show_default=True, help=sentence("top"))
-@click.option("--seed", type=int, default=default("seed"), show_default=True, help=sentence("seed"))
+@click.option(
+    "--top",
+    type=int,
+    metavar="K",
+    default=default("top"),
+    show_default=True,
+    help=sentence("top"),
+)
+@click.option(
+    "--seed",
+    type=int,
+    default=default("seed"),
+    show_default=True,
+    help=sentence("seed"),
+)
 @search_options.device
 @search_options.threads
 @click.option("--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height).")

@@ -11,12 +11,10 @@ from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.cli.render import SizeType
 from p3i.errors import UsageError
-from p3i.paint.rectify_options import default, sentence
 from p3i.paint.tile_options import SOURCES, TileOptions
+from p3i.records import told
 
-
-def _sentence(name: str) -> str:
-    return sentence(TileOptions, name)
+sentence, default = told(TileOptions)
 
 
 class RepeatType(click.ParamType):
@@ -46,27 +44,27 @@ class RepeatType(click.ParamType):
     "--from",
     "source",
     type=click.Choice(SOURCES),
-    default=default(TileOptions, "source"),
+    default=default("source"),
     show_default=True,
-    help=_sentence("source"),
+    help=sentence("source"),
 )
-@click.option("--size", type=SizeType(), metavar="WxH", help=_sentence("size"))
-@click.option("--repeat", type=RepeatType(), metavar="NxM", default=(1, 1), help=_sentence("repeat"))
+@click.option("--size", type=SizeType(), metavar="WxH", help=sentence("size"))
+@click.option("--repeat", type=RepeatType(), metavar="NxM", default=(1, 1), help=sentence("repeat"))
 @click.option(
     "--even-light/--keep-light",
     "light",
-    default=default(TileOptions, "light"),
+    default=default("light"),
     show_default=True,
-    help=_sentence("light"),
+    help=sentence("light"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=_sentence("focal_mm"))
+@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
 @click.option(
     "--max-px",
     type=int,
     metavar="N",
-    default=default(TileOptions, "max_px"),
+    default=default("max_px"),
     show_default=True,
-    help=_sentence("max_px"),
+    help=sentence("max_px"),
 )
 @options.quiet
 @options.verbose

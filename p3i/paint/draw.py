@@ -1,6 +1,5 @@
 """Programs as pictures: alone, over their photo, or straightened; with dots, cells, or pictures."""
 
-import dataclasses
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
@@ -31,6 +30,7 @@ from p3i.paint.view import (
     refuse_huge,
     straight_view,
 )
+from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image, read_image
 from p3i.vision.write import encode, write_bytes
@@ -119,7 +119,7 @@ def render(
     Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
     sketches among them, UsageError for options that cannot be.
     """
-    options = _changed(options or RenderOptions(), changes)
+    options = changed(options or RenderOptions(), changes, verb="render")
     if not isinstance(program, Program):
         beside = Path(fspath(program)).parent if beside is None else beside
         program = read_program(program)
@@ -214,13 +214,6 @@ def _layers(
             scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=photo is not None)
         )
     return tuple(layers)
-
-
-def _changed(options: RenderOptions, changes: dict[str, Any]) -> RenderOptions:
-    known = {field.name for field in dataclasses.fields(RenderOptions)}
-    if unknown := sorted(changes.keys() - known):
-        raise UsageError(f"render has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    return dataclasses.replace(options, **changes) if changes else options
 
 
 def _camera(program: Program, options: RenderOptions, photo: Image | None) -> tuple[Camera, FocalSource]:

@@ -25,7 +25,7 @@ from p3i.paint.edit_options import EditOptions
 from p3i.paint.outlines import chart_of, pitch
 from p3i.paint.picture import Picture, opacity, repainted
 from p3i.paint.placed import Placed, placed, straight
-from p3i.paint.rectify_options import changed
+from p3i.records import changed
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
 from p3i.vision.warp import pixel_grid, remapped

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.records import check_focal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,8 +29,7 @@ class EditOptions:
     def __post_init__(self) -> None:
         if self.scale is not None and not (math.isfinite(self.scale) and 0.05 <= self.scale <= 20):
             raise UsageError(f"a scale lies between 0.05 and 20, or is auto, not {self.scale:g}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        check_focal(self.focal_mm)
 
 
 def parse_scale(text: str) -> float | None:

@@ -29,8 +29,8 @@ from p3i.paint.extend_options import SIDES, ExtendOptions, Margins
 from p3i.paint.outlines import chart_of, polygons
 from p3i.paint.picture import Picture, opacity, repainted
 from p3i.paint.placed import Placed, placed
-from p3i.paint.rectify_options import changed
 from p3i.paint.stack import fill_by_stack
+from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.fill import filled
 from p3i.vision.image import Image

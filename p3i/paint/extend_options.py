@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 
 SIDES = ("left", "top", "right", "bottom")
 """The sides of a picture, in the order in which margins are given."""
@@ -72,13 +73,9 @@ class ExtendOptions:
         "are of the width (left, right) and of the height (top, bottom). [default: 20%]",
     ] = Margins(20, 20, 20, 20, "%")
     max_px: Annotated[int, "Make no picture of more than N pixels (width times height)."] = 100_000_000
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
         if self.max_px < 1:
             raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        check_focal(self.focal_mm)

@@ -23,8 +23,8 @@ from p3i.paint.objects import objects_of
 from p3i.paint.picture import Picture, opacity, repainted
 from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.points_options import PointsOptions
-from p3i.paint.rectify_options import changed
 from p3i.paint.stack import fill_by_stack
+from p3i.records import changed
 from p3i.vision.image import Image, read_mask
 from p3i.vision.warp import pixel_grid, remapped
 

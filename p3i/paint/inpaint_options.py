@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 
 METHODS = ("stack", "npn", "patchmatch")
 """The ways to fill a hole."""
@@ -31,10 +32,7 @@ class InpaintOptions:
     seed: Annotated[int, "With npn and patchmatch: the seed of what is random."] = 0
     device: Annotated[str, "With npn: where the network runs: auto, cpu, cuda, ..."] = "auto"
     threads: Annotated[int, "With npn: threads of the network."] = 1
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -45,8 +43,7 @@ class InpaintOptions:
             raise UsageError(f"a time limit is above 0 seconds, not {self.time_s:g}")
         if self.threads < 1:
             raise UsageError(f"at least one thread is needed, not {self.threads}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        check_focal(self.focal_mm)
         if self.method != "npn":
             for name, value in (("time", self.time_s), ("checkpoint", self.checkpoint)):
                 if value is not None:

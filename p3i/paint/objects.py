@@ -4,8 +4,6 @@ Convention: pixels of the photo, pixel centres at whole numbers, x right, y down
 The formats in p3i/paint/export have their own pixels and say so.
 """
 
-import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -23,6 +21,7 @@ from p3i.paint.naming import Arrangement, Naming, named
 from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.points_options import PointsOptions, format_of
 from p3i.paint.presence import presence_of
+from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.write import write_bytes
@@ -160,7 +159,7 @@ def objects_of(
     cannot be and where no canvas is known, ProgramError for a program that draws nothing in front of its
     camera.
     """
-    options = changed(options or PointsOptions(), changes)
+    options = changed(options or PointsOptions(), changes, verb="points")
     canvas = photo if photo is not None else _blank(program, options)
     laid = placed(program, canvas, focal_mm=options.focal_mm)
     naming = named(laid)
@@ -221,14 +220,6 @@ def objects_of(
         photo=photo,
         notes=photo.notes if photo is not None else (),
     )
-
-
-def changed(options: PointsOptions, changes: Mapping[str, Any]) -> PointsOptions:
-    """`options` with some fields changed; raises UsageError for a name that is no field."""
-    known = {field.name for field in dataclasses.fields(PointsOptions)}
-    if unknown := sorted(changes.keys() - known):
-        raise UsageError(f"points has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    return dataclasses.replace(options, **changes) if changes else options
 
 
 def cell_on_photo(laid: Placed, cell: np.ndarray, k1: float | None) -> np.ndarray:

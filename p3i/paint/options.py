@@ -4,14 +4,14 @@ Each field carries the sentence that documents it, so `p3i render --help` and `h
 differ. Imports neither torch nor numpy: `p3i render --help` reads this file.
 """
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 from p3i.size import Size
 
 KINDS = ("png", "svg", "pdf")
@@ -40,32 +40,18 @@ class RenderOptions:
         float | None,
         "The longer side of an object's picture in program units; by default a little less than the spacing.",
     ] = None
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
     max_px: Annotated[int, "Refuse to make pictures of more than N pixels (width times height)."] = (
         100_000_000
     )
 
     def __post_init__(self) -> None:
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        check_focal(self.focal_mm)
         units = self.sprite_units
         if units is not None and not (math.isfinite(units) and 0 < units <= 1e6):
             raise UsageError(f"a picture's side is more than 0 program units, not {units:g}")
         if self.max_px < 1:
             raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
-
-
-def sentence(name: str) -> str:
-    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
-    return get_type_hints(RenderOptions, include_extras=True)[name].__metadata__[0]
-
-
-def default(name: str) -> Any:
-    """The default of the field `name`; raises KeyError where there is no such field."""
-    return {field.name: field.default for field in dataclasses.fields(RenderOptions)}[name]
 
 
 def kind_of(path: str | PathLike[str]) -> str:

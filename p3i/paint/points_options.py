@@ -3,14 +3,14 @@
 Each field carries the sentence that documents it. Imports neither torch nor numpy.
 """
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 from p3i.size import Size
 
 FORMATS = ("csv", "json", "coco", "labelme", "geojson", "svg", "dxf")
@@ -34,28 +34,14 @@ class PointsOptions:
     outside: Annotated[bool, "List the objects that lie outside the photo too."] = False
     clip: Annotated[bool, "Cut the cells off at the photo's edge (COCO always does)."] = False
     label: Annotated[str, "The class of the objects in COCO, labelme and GeoJSON."] = "object"
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.min_presence) and 0 <= self.min_presence <= 1):
             raise UsageError(f"the least presence lies between 0 and 1, not {self.min_presence:g}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        check_focal(self.focal_mm)
         if not self.label.strip() or not self.label.isprintable():
             raise UsageError("the label of the objects is a word, not empty")
-
-
-def sentence(name: str) -> str:
-    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
-    return get_type_hints(PointsOptions, include_extras=True)[name].__metadata__[0]
-
-
-def default(name: str) -> Any:
-    """The default of the field `name`; raises KeyError where there is no such field."""
-    return {field.name: field.default for field in dataclasses.fields(PointsOptions)}[name]
 
 
 def format_of(path: str | PathLike[str]) -> str:

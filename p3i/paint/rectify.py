@@ -11,8 +11,9 @@ from p3i.paint.back import back
 from p3i.paint.framing import straightened
 from p3i.paint.picture import Picture, depth, opacity
 from p3i.paint.placed import placed
-from p3i.paint.rectify_options import RectifyOptions, changed
+from p3i.paint.rectify_options import RectifyOptions
 from p3i.paint.straightened import Straightened
+from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.resample import resample

@@ -3,13 +3,13 @@
 Imports neither torch nor numpy: `p3i rectify --help` reads this file.
 """
 
-import dataclasses
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 
 CROPS = ("pattern", "inside", "all", "same")
 """What of the plane a straightened view shows."""
@@ -20,7 +20,6 @@ PICTURE_KINDS = ("png", "jpg", "tiff", "webp")
 _TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
 
 
-Record = TypeVar("Record")
 """A record of options."""
 
 
@@ -79,10 +78,7 @@ class RectifyOptions:
         "With --back: how much a pixel (0 to 255) must differ to count as edited. [default: 0; 16 where the "
         "edited file is a JPEG or WebP, whose every pixel differs]",
     ] = None
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
         if self.crop not in CROPS:
@@ -93,25 +89,4 @@ class RectifyOptions:
             raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
         if self.tolerance is not None and not 0 <= self.tolerance < 255:
             raise UsageError(f"a tolerance lies from 0 to below 255, not {self.tolerance:g}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
-
-
-def sentence(record: type, name: str) -> str:
-    """The sentence that documents the field `name` of a record of options; KeyError where there is none."""
-    return get_type_hints(record, include_extras=True)[name].__metadata__[0]
-
-
-def default(record: type, name: str) -> Any:
-    """The default of the field `name` of a record of options; KeyError where there is none."""
-    return {field.name: field.default for field in dataclasses.fields(record)}[name]
-
-
-def changed(options: Record, changes: dict[str, Any], *, verb: str) -> Record:
-    """`options` with the fields of `changes`; raises UsageError for a field that it does not have."""
-    known = {field.name for field in dataclasses.fields(options)}  # pyright: ignore[reportArgumentType]
-    if unknown := sorted(changes.keys() - known):
-        raise UsageError(f"{verb} has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    if not changes:
-        return options
-    return dataclasses.replace(options, **changes)  # pyright: ignore[reportArgumentType]
+        check_focal(self.focal_mm)

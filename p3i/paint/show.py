@@ -4,12 +4,10 @@ Convention: pixels of the canvas, pixel centres at whole numbers.
 """
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.interp.unroll import nest
 from p3i.paint import outlines, scene
@@ -19,6 +17,7 @@ from p3i.paint.objects import THERE, Object, Objects, objects_of
 from p3i.paint.options import RenderOptions
 from p3i.paint.show_options import ShowOptions
 from p3i.paint.view import View, camera_view
+from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image, resized
 
@@ -49,7 +48,7 @@ def show(
     `changes` are fields of ShowOptions. Raises UsageError for options that cannot be, ProgramError for a
     program that draws nothing in front of its camera.
     """
-    options = _changed(options or ShowOptions(), changes)
+    options = changed(options or ShowOptions(), changes, verb="show")
     photo = resized(photo, options.longer)
     focal_mm = _focal(photo, program, options)
     judged = photo if options.presence else None
@@ -190,10 +189,3 @@ def _height(view: View, each: Object) -> float:
 
 def _points(objects: tuple[Object, ...] | list[Object]) -> np.ndarray:
     return np.array([(each.x, each.y) for each in objects], float).reshape(-1, 2)
-
-
-def _changed(options: ShowOptions, changes: Mapping[str, Any]) -> ShowOptions:
-    known = {field.name for field in dataclasses.fields(ShowOptions)}
-    if unknown := sorted(changes.keys() - known):
-        raise UsageError(f"show has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    return dataclasses.replace(options, **changes) if changes else options

@@ -3,14 +3,13 @@
 Each field carries the sentence that documents it. Imports neither torch nor numpy.
 """
 
-import dataclasses
-import math
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Literal
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 
 LABELS = ("names", "index", "none")
 """What may be written at the objects."""
@@ -37,28 +36,14 @@ class ShowOptions:
     extent: Annotated[bool, "Draw a line around all cells together."] = True
     presence: Annotated[bool, "Look which objects are there; else each gets a dot."] = True
     longer: Annotated[int, "Reduce larger photos to a longer side of N pixels first."] = 3000
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
         if self.labels not in LABELS:
             raise UsageError(f"labels are {', '.join(LABELS)}, not {self.labels!r}")
         if not 16 <= self.longer <= 20_000:
             raise UsageError(f"the longer side has between 16 and 20000 pixels, not {self.longer}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
-
-
-def sentence(name: str) -> str:
-    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
-    return get_type_hints(ShowOptions, include_extras=True)[name].__metadata__[0]
-
-
-def default(name: str) -> Any:
-    """The default of the field `name`; raises KeyError where there is no such field."""
-    return {field.name: field.default for field in dataclasses.fields(ShowOptions)}[name]
+        check_focal(self.focal_mm)
 
 
 def kind_of(path: str | PathLike[str]) -> str:

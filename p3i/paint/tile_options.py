@@ -3,11 +3,11 @@
 Imports neither torch nor numpy: `p3i tile --help` reads this file.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.records import PhotoFocal, check_focal
 from p3i.size import Size
 
 SOURCES = ("mean", "best")
@@ -32,10 +32,7 @@ class TileOptions:
     max_px: Annotated[int, "Refuse to make pictures of more than N pixels (width times height)."] = (
         100_000_000
     )
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
-    ] = None
+    focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
         if self.source not in SOURCES:
@@ -48,5 +45,4 @@ class TileOptions:
             )
         if self.max_px < 1:
             raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
-        if self.focal_mm is not None and not (math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        check_focal(self.focal_mm)

@@ -4,15 +4,14 @@ Each field carries the sentence that documents it, so `p3i synth --help` and `he
 differ. Imports neither torch nor numpy: `p3i synth --help` reads this file.
 """
 
-import dataclasses
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Literal
 
 from p3i.errors import SketchError, UsageError
 from p3i.grammar.ast import Program
 from p3i.grammar.sketch import Sketch
+from p3i.records import check_focal, told
 
 Structure = Literal["auto", "lattice", "circular", "hybrid"]
 Extent = Literal["found", "image"]
@@ -82,7 +81,7 @@ class SearchConfig:
     def __post_init__(self) -> None:
         _one_of("structure", self.structure, STRUCTURES)
         if self.recipe == "paper":  # one configuration, whole
-            if self.features == default("features"):
+            if self.features == told(SearchConfig)[1]("features"):
                 object.__setattr__(self, "features", "rgb" if self.weights is None else "alexnet")
             object.__setattr__(self, "extent", "image")
         parts = [part.strip() for part in self.features.split("+")]
@@ -93,10 +92,8 @@ class SearchConfig:
         self._check_asked()
         if isinstance(self.focal_mm, str):
             _one_of("the focal length, where no number,", self.focal_mm, ("auto",))
-        elif self.focal_mm is not None and not (
-            math.isfinite(self.focal_mm) and 1 <= self.focal_mm <= 10_000
-        ):
-            raise UsageError(f"a focal length lies between 1 and 10000 mm, not {self.focal_mm:g}")
+        else:
+            check_focal(self.focal_mm)
         if isinstance(self.lens, str):
             _one_of("the lens, where no number,", self.lens, ("auto",))
         elif self.lens is not None and not abs(self.lens) < MOST_K1:
@@ -130,16 +127,6 @@ class SearchConfig:
             raise UsageError(f"--{asked[0]} and --structure {self.structure} contradict each other")
         if asked and asked[0] in ("sketch", "start") and self.extent == "image":
             raise UsageError(f"--{asked[0]} says itself which objects are drawn: leave out --extent image")
-
-
-def sentence(name: str) -> str:
-    """The sentence that documents the field `name`; raises KeyError where there is no such field."""
-    return get_type_hints(SearchConfig, include_extras=True)[name].__metadata__[0]
-
-
-def default(name: str) -> Any:
-    """The default of the field `name`; raises KeyError where there is no such field."""
-    return {field.name: field.default for field in dataclasses.fields(SearchConfig)}[name]
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

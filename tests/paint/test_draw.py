@@ -15,11 +15,14 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Polar, Pr
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.paint.draw import overlay, render
-from p3i.paint.options import RenderOptions, default, kind_of, sentence
+from p3i.paint.options import RenderOptions, kind_of
 from p3i.paint.scene import Dots, Strokes, rainbow
+from p3i.records import told
 from p3i.size import Size
 from p3i.vision.image import Image, read_image
 from p3i.vision.write import write_image
+
+sentence, default = told(RenderOptions)
 
 torch.set_num_threads(1)
 

@@ -5,7 +5,10 @@ import dataclasses
 import pytest
 
 from p3i.errors import UsageError
-from p3i.search.config import FEATURES, SearchConfig, default, sentence
+from p3i.records import told
+from p3i.search.config import FEATURES, SearchConfig
+
+sentence, default = told(SearchConfig)
 
 
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(SearchConfig)])
