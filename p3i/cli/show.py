@@ -10,7 +10,8 @@ import click
 from p3i import api, files
 from p3i.cli import options, progress, report
 from p3i.errors import UsageError
-from p3i.paint.show_options import KINDS, LABELS, ShowOptions, kind_of
+from p3i.paint.options import KINDS, kind_of
+from p3i.paint.show_options import LABELS, ShowOptions
 from p3i.records import told
 
 sentence, default = told(ShowOptions)

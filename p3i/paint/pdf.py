@@ -84,13 +84,7 @@ def _dots(dots: Dots) -> list[str]:
 
 def _labels(labels: Labels) -> list[str]:
     lines = [f"{_rgb(labels.colour)} rg {_rgb(labels.rim)} RG"]
-    for text, (x, y), size, rim in zip(
-        labels.texts,
-        labels.anchors.tolist(),
-        labels.heights.tolist(),
-        labels.rim_widths.tolist(),
-        strict=True,
-    ):
+    for text, (x, y), size, rim in labels.words():
         word = text.encode("latin-1", "replace").decode("latin-1")
         word = "".join(
             f"\\{ord(mark):03o}" if mark in "()\\" or not " " <= mark <= "~" else mark for mark in word

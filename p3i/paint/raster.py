@@ -104,13 +104,7 @@ def _paint_dots(canvas: np.ndarray, dots: Dots) -> None:
 
 def _paint_labels(canvas: np.ndarray, labels: Labels) -> None:
     height, width = canvas.shape[:2]
-    for text, (x, y), size, rim in zip(
-        labels.texts,
-        labels.anchors.tolist(),
-        labels.heights.tolist(),
-        labels.rim_widths.tolist(),
-        strict=True,
-    ):
+    for text, (x, y), size, rim in labels.words():
         font = _font(max(1, round(size)))
         reach = int(np.ceil(font.getlength(text) / 2 + rim + 2)), int(np.ceil(size + rim + 2))
         left, top = round(x) - reach[0], round(y) - reach[1]

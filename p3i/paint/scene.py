@@ -6,6 +6,7 @@ painted in order.
 
 import colorsys
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +81,11 @@ class Labels:
     def rim_widths(self) -> np.ndarray:
         """How far the rim of each word reaches beyond its letters, in pixels: [M]."""
         return np.maximum(1.0, self.heights * _RIM_SHARE)
+
+    def words(self) -> Iterator[tuple[str, tuple[float, float], float, float]]:
+        """Each word: its text, the middle (x, y), the font's size and how far the rim reaches, in pixels."""
+        heights, rims = self.heights.tolist(), self.rim_widths.tolist()
+        yield from zip(self.texts, map(tuple, self.anchors.tolist()), heights, rims, strict=True)
 
 
 Layer = Pixels | Strokes | Dots | Labels

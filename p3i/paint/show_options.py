@@ -4,8 +4,6 @@ Each field carries the sentence that documents it. Imports neither torch nor num
 """
 
 from dataclasses import dataclass
-from os import PathLike, fspath
-from pathlib import Path
 from typing import Annotated, Literal
 
 from p3i.errors import UsageError
@@ -13,9 +11,6 @@ from p3i.records import PhotoFocal, check_focal
 
 LABELS = ("names", "index", "none")
 """What may be written at the objects."""
-
-KINDS = ("png", "svg", "pdf")
-"""What an overlay may be written as."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,12 +39,3 @@ class ShowOptions:
         if not 16 <= self.longer <= 20_000:
             raise UsageError(f"the longer side has between 16 and 20000 pixels, not {self.longer}")
         check_focal(self.focal_mm)
-
-
-def kind_of(path: str | PathLike[str]) -> str:
-    """The kind of file that a name asks for; raises UsageError for one that is not drawn."""
-    suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in KINDS:
-        known = ", ".join(f".{kind}" for kind in KINDS)
-        raise UsageError(f"cannot tell the kind of picture from {fspath(path)!r}: end the name in {known}")
-    return suffix

@@ -95,13 +95,7 @@ def _labels(labels: Labels) -> list[str]:
         f'<g font-family="sans-serif" text-anchor="middle" fill="{_hex(labels.colour)}" '
         f'stroke="{_hex(labels.rim)}" stroke-linejoin="round" paint-order="stroke">'
     ]
-    for text, (x, y), size, rim in zip(
-        labels.texts,
-        labels.anchors.tolist(),
-        labels.heights.tolist(),
-        labels.rim_widths.tolist(),
-        strict=True,
-    ):
+    for text, (x, y), size, rim in labels.words():
         lines.append(
             f'<text x="{number(x)}" y="{number(y + TO_BASELINE * size)}" font-size="{number(size)}" '
             f'stroke-width="{number(2 * rim)}">{escape(text)}</text>'
