@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.cells import moves, nearest, pitch_px
+from p3i.paint.matching import matched_light, shift_step
 from p3i.paint.placed import Placed
 from p3i.vision.sheet import project
+from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -40,11 +42,6 @@ _PROBES = 400
 # Shifts reach this far, in distances to the next object.
 _MOST_SHIFT = 0.12
 _SHIFTS = 3
-# Light is matched by an offset and a gain between these, drawn towards 1 as if by that share of the variance
-# and that much besides: flat surroundings say nothing of contrast.
-_GAINS = (0.5, 2.0)
-_PRIOR = 0.1
-_PRIOR_VARIANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,17 +156,6 @@ def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIE
     return [one for one in found if one.misfit <= _WORSE * found[0].misfit + _WORSE_ANYWAY][:_MOST_KEPT]
 
 
-def taken(image: NDArray, points: Array, *, sharp: bool = False) -> Floats:
-    """Samples [N, ...] of a picture [H, W, ...] at points [N, 2], bilinear, or bicubic where `sharp`."""
-    count, row = len(points), 4096  # OpenCV refuses pictures of more than 32767 samples a side
-    padded = np.zeros((2, -(-count // row) * row), np.float32)
-    padded[:, :count] = points.T
-    x, y = padded.reshape(2, -1, row)
-    how = cv2.INTER_CUBIC if sharp else cv2.INTER_LINEAR
-    found = cv2.remap(image, x, y, how, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found.reshape(-1, *image.shape[2:])[:count], np.float32)
-
-
 def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
     """The source under this matrix, shifted and in the hole's light; None where too little of it shows."""
     at, front = project(from_hole, hole.points)
@@ -183,7 +169,7 @@ def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
     shift, most = np.zeros(2), _MOST_SHIFT * hole.spacing_px
     for left in range(_SHIFTS, -1, -1):
         colours = taken(ground.pixels, at + shift)
-        gain, offset = _light(colours, hole.colours, weights)
+        gain, offset = matched_light(colours, hole.colours, weights)
         residual = hole.colours - (gain * colours + offset)
         misfit = float((weights[:, None] * np.abs(residual)).sum() / weights.sum() / 3)
         if best is None or misfit < best.misfit:
@@ -194,24 +180,9 @@ def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
             gain * (taken(ground.pixels, at + shift + half) - taken(ground.pixels, at + shift - half))
             for half in np.array([(0.5, 0.0), (0.0, 0.5)])
         ]
-        robust = weights[:, None] / (np.abs(residual) + 0.02)
-        normal = np.array([[(robust * one * other).sum() for other in slopes] for one in slopes])
-        normal += np.eye(2) * (1e-3 * np.trace(normal) + 1e-6)
-        step = np.linalg.solve(normal, [(robust * one * residual).sum() for one in slopes])
+        step = shift_step(slopes, residual, weights)
         shift = np.clip(shift + step, -most, most)
     return best
-
-
-def _light(colours: Floats, wanted: Floats, weights: Floats) -> tuple[Array, Array]:
-    """The gain and offset [3] that bring colours [K, 3] closest to those wanted."""
-    share = (weights / weights.sum())[:, None].astype(float)
-    mean, wanted_mean = (share * colours).sum(0), (share * wanted).sum(0)
-    variance = (share * (colours - mean) ** 2).sum(0)
-    together = (share * (colours - mean) * (wanted - wanted_mean)).sum(0)
-    prior = _PRIOR * variance + _PRIOR_VARIANCE
-    gain = (together + prior) / (variance + prior)
-    gain = np.clip(gain, *_GAINS)
-    return gain, wanted_mean - gain * mean
 
 
 def _spacing(placed: Placed, target: int) -> float:

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.cells import nearest
+from p3i.paint.matching import carried, trusted
 from p3i.paint.placed import Placed
-from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, sources, taken
+from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, sources
 from p3i.vision.fill import filled
 from p3i.vision.sheet import project
+from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -26,13 +28,9 @@ Progress = Callable[[str, float], None]
 
 # A piece of a hole with more cells than this is filled in blocks of two by two.
 _MOST_CELLS = 9
-# How far the weights are drawn to the sources' own misfits: a share of the mean square of the residuals.
-_RIDGE = 0.3
 # The rim at which the fill is compared with the photo, in pixels, and the most that is carried in from there.
 _RIM_PX = 4.0
 _MOST_CARRIED = 0.15
-# What is carried in is smoothed along the rim over this share of the distance to the next object.
-_SMOOTH = 0.125
 
 
 def fill_by_stack(
@@ -113,24 +111,13 @@ def _filled(
 
 def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
-    misfits = np.array([source.misfit for source in found])
-    prior = 1 / (misfits**2 + 1e-5)
-    prior /= prior.sum()
     residuals = []
     for source in found:
         at, front = source.where(hole.around)
         colours = source.gain * taken(ground.pixels, at) + source.offset
         shown = (front & ground.known(at))[:, None]
-        residuals.append(
-            (np.where(shown, colours - hole.colours, 0) * np.sqrt(hole.weights)[:, None]).ravel()
-        )
-    rows = np.stack(residuals)
-    products = rows @ rows.T / (3 * hole.weights.sum())
-    ridge = _RIDGE * np.trace(products) / len(found) + 1e-9
-    normal = products + ridge * np.eye(len(found))
-    towards, even = np.linalg.solve(normal, np.stack([ridge * prior, np.ones(len(found))], 1)).T
-    weights = np.clip(towards + even * (1 - towards.sum()) / even.sum(), 0, None)
-    return weights / weights.sum()
+        residuals.append(np.where(shown, colours - hole.colours, 0))
+    return trusted(np.stack(residuals), hole.weights, np.array([source.misfit for source in found]))
 
 
 def _mixed(
@@ -179,17 +166,4 @@ def _carried(
     off = np.clip(photo - colours[compared], -_MOST_CARRIED, _MOST_CARRIED)
     values, weighed = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
     values[rim_rows, rim_columns], weighed[rim_rows, rim_columns] = off, 1
-    total = np.zeros((len(hole.points), 3), np.float32)
-    weight = np.zeros(len(hole.points), np.float32)
-    for scale in (
-        0.5,
-        1.0,
-        2.0,
-        4.0,
-    ):  # near the rim its own difference counts, further in that of all around
-        sigma = max(0.7, scale * _SMOOTH * hole.spacing_px)
-        for plane, summed in ((values, total), (weighed, weight)):
-            blurred = cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
-            summed += blurred[rows, columns] / scale
-    fading = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
-    return (total * fading[:, None]).astype(np.float32)
+    return carried(values, weighed, spacing_px=hole.spacing_px)[rows, columns]

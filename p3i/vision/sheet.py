@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.vision.warp import taken
+
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -128,16 +130,6 @@ def sheet_points(box: Box, side: int) -> Array:
     return np.stack(np.meshgrid(a, b), axis=-1)
 
 
-def _take(image: NDArray, x: Floats, y: Floats) -> Floats:
-    """Bilinear samples [N, ...] of an image [H, W, ...] at N places."""
-    count, row = len(x), 4096  # OpenCV refuses pictures of more than 32767 samples a side
-    padded = np.zeros((2, -(-count // row) * row), np.float32)
-    padded[0, :count], padded[1, :count] = x, y
-    at = padded.reshape(2, -1, row)
-    taken = cv2.remap(image, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(taken.reshape(-1, *image.shape[2:])[:count], np.float32)
-
-
 def straighten(pixels: Floats, valid: Mask, image_from_cells: Array, *, box: Box, side: int) -> Sheet:
     """The photo [H, W, 3] resampled in lattice coordinates, RGB first, free of aliasing.
 
@@ -173,9 +165,9 @@ def sampled(
         here = inside & (level == k)
         if not here.any():
             continue
-        x, y = places[..., 0][here] / 2**k, places[..., 1][here] / 2**k
-        taken, known = _take(colour, x, y), _take(weight, x, y)
-        values[here] = taken / np.maximum(known, 1e-3)[:, None]
+        points = places[here] / 2**k
+        known = taken(weight, points)
+        values[here] = taken(colour, points) / np.maximum(known, 1e-3)[:, None]
         seen[here] = known > 0.6
     values[~seen] = 0
     return Sheet(np.ascontiguousarray(values.transpose(2, 0, 1)), seen, box, side)

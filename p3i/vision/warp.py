@@ -16,6 +16,8 @@ from p3i.size import Size
 
 # A point is known where all pixels that it is read from are, up to the rounding of float32.
 _WHOLE = 1 - 1e-3
+# Scattered points are read in rows of this many: OpenCV refuses maps of more than 32767 a side.
+_ROW = 4096
 
 
 def sample(values: Tensor, points_px: Tensor) -> Tensor:
@@ -99,6 +101,22 @@ def remapped(pixels: np.ndarray, valid: np.ndarray, points_px: np.ndarray) -> tu
         whole = cv2.remap(valid.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         known &= whole >= _WHOLE
     return values, known
+
+
+def taken(image: np.ndarray, points_px: np.ndarray, *, sharp: bool = False) -> np.ndarray:
+    """A picture read at scattered points: bilinear, or bicubic where `sharp`.
+
+    Shapes: image [H, W, ...] float32, points_px [N, 2] (x, y) -> [N, ...] float32. Points outside read the
+    nearest pixel.
+    """
+    count = len(points_px)
+    row = max(1, min(count, _ROW))
+    padded = np.zeros((2, -(-count // row) * row), np.float32)
+    padded[:, :count] = points_px.T
+    x, y = padded.reshape(2, -1, row)
+    how = cv2.INTER_CUBIC if sharp else cv2.INTER_LINEAR
+    found = cv2.remap(image, x, y, how, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(found.reshape(-1, *image.shape[2:])[:count], np.float32)
 
 
 def pixel_grid(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from p3i.paint.matching import carried, matched_light, shift_step, trusted
 from p3i.paint.npn.window import Bank, grid, project, step_px
 
 # The surroundings that sources are weighed on reach this far, in distances between cells.
@@ -28,6 +29,8 @@ _FEWEST = 2
 _LEAST_KNOWN = 0.3
 # ... and has objects near at least so much of what has them in the hole.
 _LEAST_HOME = 0.6
+# No source counts for nothing: the network starts from the logarithms.
+_LEAST_WEIGHT = 1e-4
 # The membrane lifts or lowers by at most this.
 _MOST_LIFT = 0.15
 
@@ -120,16 +123,9 @@ def _matched(
     source: np.ndarray, wanted: np.ndarray, trust: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Gain [3] and offset [3] that bring `source` [N, 3] near `wanted`, and the mean difference left."""
-    total = max(float(trust.sum()), 1e-9)
-    weight = trust[:, None]
-    source_mean, wanted_mean = (weight * source).sum(0) / total, (weight * wanted).sum(0) / total
-    spread = (weight * (source - source_mean) ** 2).sum(0) / total
-    shared = (weight * (source - source_mean) * (wanted - wanted_mean)).sum(0) / total
-    # Drawn towards 1: a flat surrounding says nothing of the gain.
-    gain = np.clip((shared + 0.1 * spread + 1e-3) / (1.1 * spread + 1e-3), 0.5, 2.0)
-    offset = wanted_mean - gain * source_mean
-    error = float((weight * np.abs(gain * source + offset - wanted)).sum() / total / 3)
-    return gain, offset, error
+    gain, offset = matched_light(source, wanted, trust)
+    off = trust[:, None] * np.abs(gain * source + offset - wanted)
+    return gain, offset, float(off.sum() / max(float(trust.sum()), 1e-9) / 3)
 
 
 def _aligned(
@@ -155,17 +151,8 @@ def _aligned(
         if turn == 3:
             break
         left = wanted - (gain * source + offset)
-        across, down = gain * (right - left_of), gain * (below - above)
-        weight = trust[:, None] / (np.abs(left) + 0.02)
-        normal = np.array(
-            [
-                [(weight * across * across).sum(), (weight * across * down).sum()],
-                [(weight * across * down).sum(), (weight * down * down).sum()],
-            ]
-        )
-        normal += np.eye(2) * (1e-3 * np.trace(normal) + 1e-6)
-        force = np.array([(weight * across * left).sum(), (weight * down * left).sum()])
-        shift = np.clip(shift + np.linalg.solve(normal, force), -most, most)
+        slopes = gain * (right - left_of), gain * (below - above)
+        shift = np.clip(shift + shift_step(slopes, left, trust), -most, most)
     assert best is not None
     return best
 
@@ -196,26 +183,12 @@ def _stacked(bank: Bank, hole: np.ndarray, target: int, chosen: list, seen: tupl
         np.stack([source[core] for source in sources]),
         np.stack([known[core] for known in knowns]),
         np.stack([lift[core] for lift in lifts]),
-        _weights(np.stack(differences), closeness, errors),
+        trusted(np.stack(differences), closeness, errors, least=_LEAST_WEIGHT).astype(np.float32),
         np.stack(matrices),
         np.stack([fit[1] for _, _, fit in chosen]).astype(np.float32),
         np.stack([fit[2] for _, _, fit in chosen]).astype(np.float32),
         errors.astype(np.float32),
     )
-
-
-def _weights(differences: np.ndarray, closeness: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Weights [K] of sum 1 whose mean is nearest the context: least squares, drawn to the inverse errors."""
-    count = len(errors)
-    prior = 1 / (errors**2 + 1e-5)
-    prior = prior / prior.sum()
-    scaled = (differences * np.sqrt(closeness)[None, :, None]).reshape(count, -1)
-    gram = scaled @ scaled.T / (3 * closeness.sum())
-    strength = 0.3 * np.trace(gram) / count + 1e-9
-    system = gram + strength * np.eye(count)
-    first, ones = np.linalg.solve(system, strength * prior), np.linalg.solve(system, np.ones(count))
-    weights = np.clip(first + ones * (1 - first.sum()) / ones.sum(), 1e-4, None)
-    return (weights / weights.sum()).astype(np.float32)
 
 
 def membrane(difference: np.ndarray, hole: np.ndarray, known: np.ndarray, *, pitch: float) -> np.ndarray:
@@ -225,11 +198,5 @@ def membrane(difference: np.ndarray, hole: np.ndarray, known: np.ndarray, *, pit
     """
     far = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5))
     rim = (known & (far <= 2.0) & ~hole).astype(np.float32)
-    read = np.clip(difference, -_MOST_LIFT, _MOST_LIFT) * rim[:, :, None]
-    total, weight = np.zeros_like(difference, dtype=np.float32), np.zeros(hole.shape, np.float32)
-    for size in (0.5, 1, 2, 4):
-        sigma = max(0.7, size * 0.125 * pitch)
-        total += cv2.GaussianBlur(read, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / size
-        weight += cv2.GaussianBlur(rim, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / size
-    mean = total / np.maximum(weight, 1e-9)[:, :, None]
-    return (mean * np.minimum(1, weight / 1e-3)[:, :, None]).astype(np.float32)
+    off = np.clip(difference, -_MOST_LIFT, _MOST_LIFT).astype(np.float32) * rim[:, :, None]
+    return carried(off, rim, spacing_px=pitch)

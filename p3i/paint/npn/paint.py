@@ -18,12 +18,11 @@ from p3i.paint.npn.window import Bank, Pyramid, Window, bank_of, project, step_p
 from p3i.paint.placed import Placed
 from p3i.paint.stack import fill_by_stack
 from p3i.vision.image import Image
+from p3i.vision.warp import taken
 
 # Of the change that held-out cells ask for, so much is made: they are few, and choose weights that suit them.
 # Measured (docs/npn.md): all of it wins as often, but where it loses it loses twice as much.
 _TAKEN = 0.5
-# Where a photo is read at more points than this, OpenCV is asked in parts: it takes fewer than 32768 a side.
-_AT_ONCE = 30_000
 
 
 def paint(
@@ -169,7 +168,7 @@ def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.n
 
     def magnified(planes: np.ndarray) -> np.ndarray:
         """[C, h, w] read at the hole's pixels: [P, C]."""
-        return np.stack([_at(np.ascontiguousarray(plane), core) for plane in planes], axis=1)
+        return np.stack([taken(np.ascontiguousarray(plane), core) for plane in planes], axis=1)
 
     attention = magnified(said.attention[0, :, 0].cpu().numpy())
     strength = magnified(said.strength[0].cpu().numpy())
@@ -186,18 +185,3 @@ def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.n
     filled = total / np.maximum(weight, 1e-4)[:, None] + magnified(said.correction[0].cpu().numpy())
     # Where no source shows the ground there is nothing to tell of.
     return np.where((weight > 1e-2)[:, None], filled, 0)
-
-
-def _at(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """One plane [h, w] read at points [P, 2]: [P]."""
-    found = [
-        cv2.remap(
-            plane,
-            np.ascontiguousarray(points[None, first : first + _AT_ONCE, 0]),
-            np.ascontiguousarray(points[None, first : first + _AT_ONCE, 1]),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )[0]
-        for first in range(0, len(points), _AT_ONCE)
-    ]
-    return np.concatenate(found)

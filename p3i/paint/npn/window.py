@@ -12,10 +12,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import torch
 
 from p3i.paint.cells import moves, pitch_px
 from p3i.paint.placed import Placed
+from p3i.size import Size
 from p3i.vision.image import Image, resized
+from p3i.vision.sheet import project as project_with_front
+from p3i.vision.warp import pixel_grid, taken
 
 # So much of the hole's surroundings is looked at, in distances between cells.
 _MARGIN = 0.6
@@ -98,39 +102,31 @@ class Pyramid:
         pixels = self._levels[level]
         shrink = self._levels[0].shape[1] / pixels.shape[1], self._levels[0].shape[0] / pixels.shape[0]
         places = (points + 0.5) / np.array(shrink) - 0.5
-        return _remap(pixels, places, cv2.INTER_CUBIC if cubic else cv2.INTER_LINEAR)
+        return _read(pixels, places, sharp=cubic)
 
     def read_known(self, points: np.ndarray) -> np.ndarray:
         """Which points [..., 2] of the photo are read from evidence alone."""
         height, width = self.known.shape
         x, y = points[..., 0], points[..., 1]
         inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
-        return inside & (_remap(self.known, points, cv2.INTER_LINEAR) > 0.99)
+        return inside & (_read(self.known, points) > 0.99)
 
 
-def _remap(pixels: np.ndarray, points: np.ndarray, how: int) -> np.ndarray:
-    flat = np.clip(np.nan_to_num(points, nan=-1e4), -1e4, 1e6).reshape(-1, 2).astype(np.float32)
-    # OpenCV wants both sides of a map below 32768.
-    row = 8192
-    padded = np.zeros((-(-len(flat) // row) * row, 2), np.float32)
-    padded[: len(flat)] = flat
-    grid = padded.reshape(-1, row, 2)
-    if len(flat) < row:
-        grid = flat[None]
-    found = cv2.remap(pixels, grid[..., 0], grid[..., 1], how, borderMode=cv2.BORDER_REPLICATE)
-    return found.reshape(-1, *pixels.shape[2:])[: len(flat)].reshape(*points.shape[:-1], *pixels.shape[2:])
+def _read(pixels: np.ndarray, points: np.ndarray, *, sharp: bool = False) -> np.ndarray:
+    """A picture read at points [..., 2]; those that have no place read any pixel."""
+    flat = np.clip(np.nan_to_num(points, nan=-1e4), -1e4, 1e6).reshape(-1, 2)
+    return taken(pixels, flat, sharp=sharp).reshape(*points.shape[:-1], *pixels.shape[2:])
 
 
 def project(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points [..., 2] through a homography; nan for those at or behind the camera."""
-    moved = points @ matrix[:, :2].T + matrix[:, 2]
-    depth = np.where(moved[..., 2:] > 1e-9, moved[..., 2:], np.nan)
-    return moved[..., :2] / depth
+    at, front = project_with_front(matrix, points)
+    return np.where(front[..., None], at, np.nan)
 
 
 def grid(width: int, height: int) -> np.ndarray:
     """The pixel centres [height, width, 2] of a window."""
-    return np.stack(np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float)), axis=-1)
+    return pixel_grid(Size(width, height), dtype=torch.float64).numpy()
 
 
 def window_of(placed: Placed, hole: np.ndarray, *, working_px: int) -> Window:
