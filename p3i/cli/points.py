@@ -11,6 +11,7 @@ import click
 from p3i import api, files
 from p3i.cli import options, photos, progress, report
 from p3i.cli.render import SizeType
+from p3i.cli.targets import targets
 from p3i.errors import P3IError, UsageError
 from p3i.paint.points_options import FORMATS, PointsOptions, format_of
 from p3i.records import told
@@ -141,31 +142,24 @@ class Call:
 
 def run(call: Call) -> int:
     """List the objects of each input and return the exit code: 6 where some of many failed."""
-    targets = _targets(call)
-    if call.into_folder:
-        files.make_folder(Path(call.output))
-    if call.output != "-":
-        for target in targets:
-            files.check_writable(Path(target), force=call.force)
-    if len(targets) == 1:
-        return _list(call, call.programs[0], targets[0])
+    ending = _ENDINGS.get(call.form, f".{call.form}")
+    names = [f"{Path(program).stem or 'stdin'}{ending}" for program in call.programs]
+    found = targets(
+        call.output,
+        names,
+        into_folder=call.into_folder,
+        clash="two inputs would both be written to",
+        force=call.force,
+    )
+    if len(found) == 1:
+        return _list(call, call.programs[0], found[0])
     codes = []
-    for program, target in zip(call.programs, targets, strict=True):
+    for program, target in zip(call.programs, found, strict=True):
         try:
             codes.append(_list(call, program, target))
         except P3IError as error:
             codes.append(report.p3i_error(error, as_json=call.errors_as_json))
     return 0 if not any(codes) else codes[0] if len(set(codes)) == 1 else 6
-
-
-def _targets(call: Call) -> list[str]:
-    if not call.into_folder:
-        return [call.output]
-    ending = _ENDINGS.get(call.form, f".{call.form}")
-    names = [f"{Path(program).stem or 'stdin'}{ending}" for program in call.programs]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise UsageError(f"two inputs would both be written to {Path(call.output) / twice[0]}")
-    return [str(Path(call.output) / name) for name in names]
 
 
 def _list(call: Call, program: str, target: str) -> int:

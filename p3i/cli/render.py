@@ -12,6 +12,7 @@ import click
 
 from p3i import api, files
 from p3i.cli import options, report
+from p3i.cli.targets import targets
 from p3i.errors import P3IError, UsageError
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.records import told
@@ -147,34 +148,27 @@ class Call:
 
 def run(call: Call) -> int:
     """Draw the programs in order and return the exit code: 6 where some of many failed."""
-    targets = _targets(call)
-    if call.into_folder:
-        files.make_folder(Path(call.output))
-    if call.output != "-":
-        for target in targets:
-            files.check_writable(Path(target), force=call.force)
-    if len(targets) == 1:
+    names = [f"{program.stem or program.name}.{call.kind}" for program in call.programs]
+    found = targets(
+        call.output,
+        names,
+        into_folder=call.into_folder,
+        clash="two programs would both be drawn to",
+        force=call.force,
+    )
+    if len(found) == 1:
         if call.watch:
-            _watch(call, targets[0])
-        _draw(call, call.programs[0], targets[0], force=call.force)
+            _watch(call, found[0])
+        _draw(call, call.programs[0], found[0], force=call.force)
         return 0
     failed = 0
-    for program, target in zip(call.programs, targets, strict=True):
+    for program, target in zip(call.programs, found, strict=True):
         try:
             _draw(call, program, target, force=call.force)
         except P3IError as error:
             failed += 1
             report.p3i_error(error, as_json=call.errors_as_json)
     return 6 if failed else 0
-
-
-def _targets(call: Call) -> list[str]:
-    if not call.into_folder:
-        return [call.output]
-    names = [f"{program.stem or program.name}.{call.kind}" for program in call.programs]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise UsageError(f"two programs would both be drawn to {Path(call.output) / twice[0]}")
-    return [str(Path(call.output) / name) for name in names]
 
 
 def _draw(call: Call, program: Path, target: str, *, force: bool) -> None:
