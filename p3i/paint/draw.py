@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from p3i.paint.lens import bent, bent_points, straight_photo
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
+from p3i.paint.placed import FocalSource, camera_of
 from p3i.paint.raster import paint
 from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.sprite import lay, sprite_of
@@ -36,7 +37,6 @@ from p3i.vision.image import Image, read_image
 from p3i.vision.write import encode, write_bytes
 
 Path_ = str | PathLike[str]
-FocalSource = Literal["option", "header", "exif", "default"]
 
 _DOT_SHARE, _PHOTO_DOT_SHARE = 0.2, 0.11
 """A dot's radius as a share of the spacing; over a photo it should leave the object to be seen."""
@@ -125,7 +125,7 @@ def render(
         program = read_program(program)
     folder = Path(beside or ".")
     photo = read_image(image) if isinstance(image, str | PathLike) else image
-    camera, focal_source = _camera(program, options, photo)
+    camera, focal_source = camera_of(program, photo, focal_mm=options.focal_mm)
 
     pictures = _sprite(program, sprite, folder)
     # Numbers of any size may stand in a program; what overflows around an object is left out.
@@ -214,16 +214,6 @@ def _layers(
             scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=photo is not None)
         )
     return tuple(layers)
-
-
-def _camera(program: Program, options: RenderOptions, photo: Image | None) -> tuple[Camera, FocalSource]:
-    header_mm = program.header.focal_mm if program.header else None
-    choices: list[tuple[float | None, FocalSource]] = [(options.focal_mm, "option"), (header_mm, "header")]
-    choices.append((photo.focal_mm if photo else None, "exif"))
-    for focal_mm, origin in choices:
-        if focal_mm is not None:
-            return Camera.of(program, focal_mm=focal_mm), origin
-    return Camera.of(program), "default"
 
 
 def _canvas(program: Program, options: RenderOptions, photo: Image | None) -> Size | None:

@@ -6,6 +6,7 @@ front). A photo whose lens bends lines (header key lens_k1) is straightened firs
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import torch
@@ -20,6 +21,8 @@ from p3i.paint.lens import straight_photo
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
+
+FocalSource = Literal["option", "header", "exif", "default"]
 
 # Objects farther out, in program units, come of overflows.
 _FAR = 1e6
@@ -73,14 +76,25 @@ class Placed:
         return self.at(np.zeros((1, 2)))[0]
 
 
+def camera_of(
+    program: Program, photo: Image | None, *, focal_mm: float | None = None
+) -> tuple[Camera, FocalSource]:
+    """The camera of a program and where its focal is from: `focal_mm`, the header, the photo, or 35 mm."""
+    header_mm = program.header.focal_mm if program.header else None
+    choices: list[tuple[float | None, FocalSource]] = [(focal_mm, "option"), (header_mm, "header")]
+    choices.append((photo.focal_mm if photo else None, "exif"))
+    for known_mm, origin in choices:
+        if known_mm is not None:
+            return Camera.of(program, focal_mm=known_mm), origin
+    return Camera.of(program), "default"
+
+
 def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> Placed:
     """`program` on the canvas of `photo`; the focal is `focal_mm`, else the header's, the photo's, 35 mm.
 
     Raises ProgramError for a program without objects, or with none in front of the camera.
     """
-    header_mm = program.header.focal_mm if program.header else None
-    known = next((mm for mm in (focal_mm, header_mm, photo.focal_mm) if mm is not None), None)
-    camera = Camera.of(program) if known is None else Camera.of(program, focal_mm=known)
+    camera, _ = camera_of(program, photo, focal_mm=focal_mm)
     found = [place for place in points(program) if abs(place[0]) < _FAR and abs(place[1]) < _FAR]
     kept = [found[place] for place in distinct(found)]
     result = Placed(
