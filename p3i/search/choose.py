@@ -102,19 +102,21 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
     """What a program explains of the photo, object by object; nothing where fewer than two are in sight."""
     pattern = without_doubles(compile(answer.program))
     focal_mm = answer.focal_mm or evidence.focal_mm
-    index = pattern.index[evidence.in_sight(pattern, focal_mm=focal_mm)].double()
+    in_sight = evidence.in_sight(pattern, focal_mm=focal_mm)
+    index = pattern.index[in_sight].double()
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return Explained(-cost, cost, len(index), torch.zeros(0), torch.zeros(0, 2), torch.zeros(0))
-    judged = index[:: len(index) // _MOST_JUDGED + 1]
+    part = slice(None, None, len(index) // _MOST_JUDGED + 1)
+    judged = index[part]
     side = _patch_side(pattern)
     found = patch_contrast(evidence, pattern, pattern.theta, judged, side=side, focal_mm=focal_mm)
     matrix = pattern.image_from_plane(pattern.theta, size=evidence.image.size, focal_mm=focal_mm)
     side_px = SIDE * sample_px(matrix, frames(pattern, pattern.theta, judged, side=side))
     each = _bits(found.agreement, found.contrast, min(_SAMPLES, (side_px / _PIXELS_APART) ** 2))
     points, _ = pattern.centers_px(size=evidence.image.size, focal_mm=focal_mm)
-    seen = points[evidence.in_sight(pattern, focal_mm=focal_mm)]
-    places = seen[:: len(index) // _MOST_JUDGED + 1]
+    seen = points[in_sight]
+    places = seen[part]
     apart = torch.cdist(places, seen)
     apart[apart < 1e-6] = math.inf
     bits = float(each.mean()) * (len(index) - 1) - cost

@@ -19,6 +19,7 @@ from p3i.interp.camera import Camera
 from p3i.search.curves import CurveFit, measured, registered
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling, fillings, start_values, unknowns_of, whole_program_sketch
+from p3i.search.rings import numbers_of, values_of
 from p3i.search.session import Answer
 from p3i.size import Size
 
@@ -65,7 +66,7 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
     other = None if start is None else _fit(evidence, filling, start, focal_mm)
     if other is None:
         return None
-    values = dict(zip((unknown.name for unknown in filling.moving), other.z.tolist(), strict=True))
+    values = values_of(other)
     found = Camera(values["camera.rx"], values["camera.ry"], focal_mm)
     apart = math.degrees(math.acos(min(1.0, abs(float(np.dot(found.normal, camera.normal))))))
     ours, theirs = (min(fit.cost, _WORST_MISFIT) + _LEAST_MISFIT for fit in (own, other))
@@ -118,8 +119,9 @@ def _mirror_image(fit: CurveFit, camera: Camera, size: Size) -> torch.Tensor | N
     mirrored = Camera.from_normal((x, y, z), focal_mm=fit.focal_mm)
     if abs(mirrored.rx_deg) > 80 or abs(mirrored.ry_deg) > 80:
         return None
-    turned = _similarity(plane, _projected(np.linalg.inv(mirrored.image_from_plane(size).numpy()), photo))
-    values = dict(zip((unknown.name for unknown in fit.filling.moving), fit.z.tolist(), strict=True))
+    plane_from_image = np.linalg.inv(mirrored.image_from_plane(size).numpy())
+    turned = _similarity(plane, _projected(plane_from_image, photo))
+    values = values_of(fit)
     values |= {"camera.rx": mirrored.rx_deg, "camera.ry": mirrored.ry_deg}
     for variable in ("1", "i", "j"):
         radius, x, y = (f"draw.{name}.{variable}" for name in ("x.radius", "x.offset", "y.offset"))
@@ -129,7 +131,7 @@ def _mirror_image(fit: CurveFit, camera: Camera, size: Size) -> torch.Tensor | N
             moved = turned.factor * complex(values[x], values[y]) + turned.shift * (variable == "1")
             values |= {x: moved.real, y: moved.imag}
     values["draw.x.angle.1"] += math.degrees(math.atan2(turned.factor.imag, turned.factor.real))
-    return torch.tensor([values[unknown.name] for unknown in fit.filling.moving], dtype=torch.float64)
+    return numbers_of(fit.filling, values)
 
 
 def _projected(matrix: Array, points: Array) -> Array:
