@@ -23,7 +23,7 @@ sentence, _ = told(EditOptions)
 @json_option
 @options.force
 @click.option("--scale", metavar="auto|S", default="auto", help=sentence("scale"))
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@options.focal(EditOptions)
 @options.quiet
 @options.verbose
 @options.error_format

@@ -15,8 +15,7 @@ sentence, default = told(ExtendOptions)
 
 
 @click.command("extend", short_help="Continue a photo beyond its frame by its pattern.")
-@click.argument("photo", metavar="PHOTO", type=click.Path())
-@click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
+@options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option
 @json_option
@@ -25,15 +24,8 @@ sentence, default = told(ExtendOptions)
 @click.option(
     "--cells", metavar="N|L,T,R,B", help="How many more cells to each side, counted at the sides' middles."
 )
-@click.option(
-    "--max-px",
-    type=int,
-    metavar="N",
-    default=default("max_px"),
-    show_default=True,
-    help=sentence("max_px"),
-)
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@options.max_px(ExtendOptions)
+@options.focal(ExtendOptions)
 @options.quiet
 @options.verbose
 @options.error_format

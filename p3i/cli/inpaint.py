@@ -17,8 +17,7 @@ sentence, default = told(InpaintOptions)
 
 
 @click.command("inpaint", short_help="Fill a hole in a photo by its pattern.")
-@click.argument("photo", metavar="PHOTO", type=click.Path())
-@click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
+@options.photo_and_program
 @click.option("--mask", metavar="FILE", type=click.Path(), help="A picture whose white pixels are filled.")
 @click.option(
     "--remove",
@@ -66,7 +65,7 @@ sentence, default = told(InpaintOptions)
     show_default=True,
     help=sentence("threads"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@options.focal(InpaintOptions)
 @options.quiet
 @options.verbose
 @options.error_format

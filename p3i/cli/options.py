@@ -5,6 +5,8 @@ from typing import Any
 
 import click
 
+from p3i.records import told
+
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 error_format: Decorator = click.option(
@@ -39,3 +41,28 @@ def output(sentence: str) -> Decorator:
         callback=lambda _context, _option, value: None if value == "-" else value,
         help=sentence,
     )
+
+
+def focal(record: type) -> Decorator:
+    """`--focal MM`, in the words of a record's field `focal_mm`."""
+    sentence, _ = told(record)
+    return click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+
+
+def max_px(record: type) -> Decorator:
+    """`--max-px N`, in the words of a record's field `max_px`."""
+    sentence, default = told(record)
+    return click.option(
+        "--max-px",
+        type=int,
+        metavar="N",
+        default=default("max_px"),
+        show_default=True,
+        help=sentence("max_px"),
+    )
+
+
+def photo_and_program(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The arguments `PHOTO [PROG]`; both arrive as text, `program` as None where there is none."""
+    program = click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
+    return click.argument("photo", metavar="PHOTO", type=click.Path())(program(command))

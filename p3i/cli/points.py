@@ -77,7 +77,7 @@ _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
 @click.option(
     "--straight/--plain", default=True, help="Crops seen straight on, or cut from the photo as it is."
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@options.focal(PointsOptions)
 @options.quiet
 @options.error_format
 def command(**given: Any) -> int:

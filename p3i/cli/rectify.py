@@ -16,8 +16,7 @@ sentence, default = told(RectifyOptions)
 
 
 @click.command("rectify", short_help="Straighten a photo by its program.")
-@click.argument("photo", metavar="PHOTO", type=click.Path())
-@click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
+@options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option
 @json_option
@@ -30,14 +29,7 @@ sentence, default = told(RectifyOptions)
     help=sentence("crop"),
 )
 @click.option("--scale", type=float, metavar="S", help=sentence("scale"))
-@click.option(
-    "--max-px",
-    type=int,
-    metavar="N",
-    default=default("max_px"),
-    show_default=True,
-    help=sentence("max_px"),
-)
+@options.max_px(RectifyOptions)
 @click.option("--cell", metavar="WxHmm", help=sentence("cell"))
 @click.option(
     "--upright/--as-seen",
@@ -45,7 +37,7 @@ sentence, default = told(RectifyOptions)
     show_default=True,
     help=sentence("upright"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@options.focal(RectifyOptions)
 @click.option(
     "--back",
     metavar="EDITED",

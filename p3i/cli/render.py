@@ -72,15 +72,8 @@ class SizeType(click.ParamType):
     default=default("horizon"),
     help=sentence("horizon"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
-@click.option(
-    "--max-px",
-    type=int,
-    metavar="N",
-    default=default("max_px"),
-    show_default=True,
-    help=sentence("max_px"),
-)
+@options.focal(RenderOptions)
+@options.max_px(RenderOptions)
 @click.option("--watch", is_flag=True, help="Draw again whenever a file that was read changes, until Ctrl-C.")
 @options.quiet
 @options.verbose

@@ -53,7 +53,7 @@ sentence, default = told(ShowOptions)
     show_default=True,
     help=sentence("longer"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
+@options.focal(ShowOptions)
 @options.quiet
 @options.error_format
 def command(photo: str, program: str | None, **given: Any) -> int:

@@ -34,8 +34,7 @@ class RepeatType(click.ParamType):
 
 
 @click.command("tile", short_help="Make a seamless texture of a photo's pattern.")
-@click.argument("photo", metavar="PHOTO", type=click.Path())
-@click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
+@options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option
 @json_option
@@ -57,15 +56,8 @@ class RepeatType(click.ParamType):
     show_default=True,
     help=sentence("light"),
 )
-@click.option("--focal", "focal_mm", type=float, metavar="MM", help=sentence("focal_mm"))
-@click.option(
-    "--max-px",
-    type=int,
-    metavar="N",
-    default=default("max_px"),
-    show_default=True,
-    help=sentence("max_px"),
-)
+@options.focal(TileOptions)
+@options.max_px(TileOptions)
 @options.quiet
 @options.verbose
 @options.error_format
