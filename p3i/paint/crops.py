@@ -10,15 +10,17 @@ from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from p3i.errors import UsageError
 from p3i.files import make_folder
 from p3i.interp.lens import photo_from_straight
 from p3i.paint.objects import Object, Objects
+from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
-from p3i.vision.warp import remapped
+from p3i.vision.warp import pixel_grid, remapped, warp_pixels
 from p3i.vision.write import write_image
 
 _MOST_PX = 2000
@@ -40,7 +42,8 @@ def write_crops(
     for each, pixels, known in crops(found, found.photo, straight=straight):
         path = Path(folder) / f"{each.name}.png"
         alpha = None if known.all() else known.astype(np.float32)
-        write_image(path, pixels, alpha=alpha, force=force)
+        # Rounded here by OpenCV: write_image guards against NaN first, which takes longer than the crop.
+        write_image(path, cv2.convertScaleAbs(pixels, alpha=255.0), alpha=alpha, force=force)
         written.append(path)
     return tuple(written)
 
@@ -79,17 +82,45 @@ def _straight(found: Objects, photo: Image, each: Object) -> tuple[np.ndarray, n
     scale = float((sides / np.array([*(high - low), *(high - low)])).max())
     scale = min(scale, _MOST_PX / float((high - low).max()))
     width, height = (max(1, round(float(side))) for side in scale * (high - low))
-    x = low[0] + (np.arange(width) + 0.5) / width * (high - low)[0]
-    y = low[1] + (np.arange(height) + 0.5) / height * (high - low)[1]
-    plane = np.stack(np.meshgrid(x, y), axis=-1) @ turn + (each.x, each.y)
-    at, _ = project(found.placed.image_from_plane, plane)
-    header = found.program.header
+    extent = high - low
+    # Crop pixels to the plane: scaled, turned upright, moved to the object.
+    plane_from_crop = np.eye(3)
+    plane_from_crop[:2, :2] = turn.T * (extent / (width, height))
+    plane_from_crop[:2, 2] = (low + 0.5 * extent / (width, height)) @ turn + (each.x, each.y)
+    photo_from_crop = found.placed.image_from_plane @ plane_from_crop
+    size, header = Size(width, height), found.program.header
     if header and header.lens_k1:
-        import torch
+        return _through_lens(photo, photo_from_crop, size, header.lens_k1)
+    pixels = warp_pixels(photo.pixels, photo_from_crop, size)
+    return pixels, _known(photo, photo_from_crop, size)
 
-        bent, shown = photo_from_straight(torch.from_numpy(at), header.lens_k1, size=found.size)
-        at = np.where(shown.numpy()[..., None], bent.numpy(), -9.0)
-    return remapped(photo.pixels, photo.valid, at)
+
+def _known(photo: Image, photo_from_crop: np.ndarray, size: Size) -> np.ndarray:
+    """Which pixels [h, w] of a crop lie on the photo and are read from known pixels only."""
+    ends = np.array([(0, 0), (size.width - 1, 0), (size.width - 1, size.height - 1), (0, size.height - 1)])
+    at, _ = project(photo_from_crop, ends)
+    limits = np.array([photo.size.width, photo.size.height]) - 1
+    # Between its corners a crop lies where they do: what is in front of the camera stays convex.
+    if (at >= 0).all() and (at <= limits).all():
+        low, high = np.floor(at.min(axis=0)).astype(int), np.ceil(at.max(axis=0)).astype(int) + 1
+        if photo.valid[low[1] : high[1], low[0] : high[0]].all():
+            return np.ones((size.height, size.width), bool)
+    how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    marked = photo.valid.view(np.uint8) * np.uint8(255)
+    # Beyond the photo nothing is known: the border is 0.
+    seen = cv2.warpPerspective(marked, photo_from_crop, (size.width, size.height), flags=how)
+    return seen == 255
+
+
+def _through_lens(
+    photo: Image, straight_from_crop: np.ndarray, size: Size, k1: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The crop of a photo whose lens bends straight lines."""
+    import torch
+
+    at, _ = project(straight_from_crop, pixel_grid(size, dtype=torch.float64).numpy())
+    bent, shown = photo_from_straight(torch.from_numpy(at), k1, size=photo.size)
+    return remapped(photo.pixels, photo.valid, np.where(shown.numpy()[..., None], bent.numpy(), -9.0))
 
 
 def _upright(found: Objects, each: Object) -> np.ndarray:
