@@ -129,13 +129,14 @@ def cells_in_view(
     least_px: float = 4.0,
     most: int = 600,
     around: Tensor | None = None,
-    few: int = _FEW_WHOLE,
+    cut: bool | None = None,
 ) -> Tensor:
     """The indices of the cells that lie wholly in the picture: float64 [N, 2].
 
     Cells smaller than `least_px` map pixels a side are left out; of more than `most` the largest stay, or,
-    where a cell `around` [2] is given, those that are the fewest steps from it. Where fewer than `few` lie
-    wholly in the picture, those that half do are taken too: a pattern of large cells has no others.
+    where a cell `around` [2] is given, those that are the fewest steps from it. `cut`: cells that the frame
+    cuts are taken too where half of them shows; None takes them where few lie wholly in the picture, since a
+    pattern of large cells has no others.
     """
     matrix = map_from_index(level, pattern, theta)
     index_from_map = np.linalg.inv(matrix)
@@ -161,7 +162,9 @@ def cells_in_view(
         torch.arange(low[1], high[1] + 1, dtype=torch.float64),
     )
     area, inside = cell_areas(matrix, index, level)
-    if int((inside & (area > least_px**2)).sum()) < few:
+    if cut is None:
+        cut = int((inside & (area > least_px**2)).sum()) < _FEW_WHOLE
+    if cut:
         inside = _shown(matrix, index, level) >= _LEAST_SHOWN
     inside &= area > least_px**2
     index, area = index[inside], area[inside]

@@ -24,8 +24,10 @@ from p3i.vision.warp import in_frame
 # a hundredth of a pixel at the far end of a long row in a large photo.
 _ANGLE_DIGITS = 3
 _LENGTH_DIGITS = 4
-# The last fit: on a map sharper by this, on at most so many objects and at least so few, so many times.
-_SHARPER = 0.6
+# The last fit: on a map sharper by this, with so many samples along a cell's side, on at most so many objects
+# and at least so few, so many times.
+_SHARPER = 0.4
+_SIDE = 16
 _MOST_REFITTED = 300
 _FEWEST_REFITTED = 6
 _REFITS = 3
@@ -155,9 +157,11 @@ def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> 
     return weighed(level, pattern, theta, index, judged_contrast(level, pattern, theta, index))
 
 
-def _drawn_cells(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> Tensor:
-    """The cells in view that a layout draws, [N, 2]."""
-    index = cells_in_view(level, pattern, theta, most=4000)
+def _drawn_cells(
+    level: Level, pattern: Pattern, layout: Layout, theta: Tensor, *, cut: bool | None = None
+) -> Tensor:
+    """The cells in view that a layout draws, [N, 2]; `cut` as in `cells_in_view`."""
+    index = cells_in_view(level, pattern, theta, most=4000, cut=cut)
     return index[torch.from_numpy(layout.holds(index.numpy()))]
 
 
@@ -165,17 +169,18 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     """The layout with camera and lattice fitted once more, to its own objects only and on the fine map.
 
     What the fit grew on had cells cut anywhere and some beyond the pattern; now each cell holds an object.
+    Objects at the frame count too: they lie farthest apart, and that fixes the pose.
     """
     theta = layout.lattice.theta(pattern)
     side = side_of_middle(evidence, pattern, layout)
     level = evidence.level_for(_SHARPER * side, finest=True)
-    index = _drawn_cells(level, pattern, layout, theta)
+    index = _drawn_cells(level, pattern, layout, theta, cut=True)
     if len(index) < _FEWEST_REFITTED:
         return layout
     index = index[:: len(index) // _MOST_REFITTED + 1]
     weights = torch.ones(len(index))
     for _ in range(_REFITS):
-        found = find_instances(level, pattern, theta, index, weights)
+        found = find_instances(level, pattern, theta, index, weights, side=_SIDE)
         weights = found.certainty
         if int((weights > 0).sum()) < _FEWEST_REFITTED:
             return layout

@@ -17,9 +17,12 @@ from p3i.search.cells import read_cells, sample_points
 from p3i.search.evidence import Level
 from p3i.search.refine import free_numbers
 
-# Samples along a cell's side, and how many of them the search reaches to each side (a third of a cell).
-_SIDE = 12
-_REACH = 4
+SIDE = 12
+"""Samples along a cell's side."""
+
+_REACH = 1 / 3
+"""The search reaches so much of a cell to each side."""
+
 # An offset is known to about this share of a cell, and no better than this many map pixels.
 _SHARE_NOISE = 0.02
 _PIXEL_NOISE = 0.25
@@ -51,21 +54,22 @@ class Instances:
 
 
 def find_instances(
-    level: Level, pattern: Pattern, theta: Tensor, index: Tensor, weights: Tensor
+    level: Level, pattern: Pattern, theta: Tensor, index: Tensor, weights: Tensor, *, side: int = SIDE
 ) -> Instances:
     """Search around each cell of `index` [N, 2] for the mean cell; `weights` [N] make that mean.
 
-    A cell takes no part in the mean that it is compared with.
+    A cell takes no part in the mean that it is compared with, and is read at `side` samples along its side.
     """
-    wide = _SIDE + 2 * _REACH
-    steps = (torch.arange(wide, dtype=torch.float64) - (wide - 1) / 2) / _SIDE
+    reach = round(_REACH * side)
+    wide = side + 2 * reach
+    steps = (torch.arange(wide, dtype=torch.float64) - (wide - 1) / 2) / side
     cells = read_cells(level, pattern, theta, index, torch.cartesian_prod(steps, steps))
     planes = cells.values.reshape(len(index), wide, wide, -1).permute(0, 3, 1, 2)  # [N, C, a, b]
     known = cells.known.reshape(len(index), 1, wide, wide).float()
-    middle = slice(_REACH, _REACH + _SIDE)
+    middle = slice(reach, reach + side)
     templates = mean_of_others(planes[:, :, middle, middle], known[:, :, middle, middle], weights)
     offsets, peak, lead = correlate(planes, known, templates)
-    return Instances(index, offsets / _SIDE, peak, lead)
+    return Instances(index, offsets / side, peak, lead)
 
 
 def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:

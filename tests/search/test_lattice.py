@@ -159,7 +159,7 @@ def test_the_cells_in_view_are_those_whose_corners_are(lattice: Lattice, least_p
     # Cells on the very edge of either limit are a matter of rounding.
     sure = {cell for cell, area in expected.items() if area > 1.001 * least_px**2}
     found = cells_in_view(
-        blank_level(), PATTERN, lattice.theta(PATTERN), least_px=least_px, most=10_000, few=0
+        blank_level(), PATTERN, lattice.theta(PATTERN), least_px=least_px, most=10_000, cut=False
     )
     assert sure <= {(int(i), int(j)) for i, j in found.tolist()} <= expected.keys()
 
@@ -167,11 +167,19 @@ def test_the_cells_in_view_are_those_whose_corners_are(lattice: Lattice, least_p
 def test_where_few_cells_are_whole_those_that_half_show_are_taken_too() -> None:
     lattice = Lattice(0.0, 0.0, np.array([[30.0, 0.0], [0.0, 30.0]]), np.zeros(2))
     theta = lattice.theta(PATTERN)
-    whole = cells_in_view(blank_level(), PATTERN, theta, few=0).tolist()
+    whole = cells_in_view(blank_level(), PATTERN, theta, cut=False).tolist()
     # 100 x 75 units show: 1.17 cells to each side of the middle one across, 0.75 up and down.
     assert whole == [[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]
     every = cells_in_view(blank_level(), PATTERN, theta).tolist()
     assert every == [[float(i), float(j)] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+
+
+def test_cells_that_the_frame_cuts_are_taken_where_they_are_asked_for() -> None:
+    lattice = Lattice(0.0, 0.0, np.array([[10.0, 0.0], [0.0, 10.0]]), np.zeros(2))
+    theta = lattice.theta(PATTERN)
+    for cut, across in ((None, 4), (False, 4), (True, 5)):  # 100 units: half of the fifth cell shows
+        cells = cells_in_view(blank_level(), PATTERN, theta, cut=cut)
+        assert cells[:, 0].abs().max() == across
 
 
 def test_of_too_many_cells_those_around_a_cell_stay() -> None:
