@@ -6,6 +6,9 @@ ground at half a step's distance, where the cell has none of an object.
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool or float32 [H, W].
 """
 
+from collections.abc import Iterator
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +34,22 @@ _BLUR = 0.12
 _DIFFUSIONS = 12
 # Texture is faint; what differs more from the light of the ground is another thing that lies there.
 _MOST_TEXTURE = 0.08
+# Light that is smooth over at least twice as many pixels is computed on a reduced picture.
+_FINEST_SIGMA = 4.0
+# Rows of the photo whose texture is looked up at once.
+_STRIP = 512
 
 
 def windows(placed: Placed, cut: Cutout, *, scale: float = 1.0) -> list[tuple[slice, slice] | None]:
     """Where each object may reach on the photo, rows and columns; None for those out of sight."""
-    half = (cut.alpha.shape[0] - 1) / 2 * cut.step * scale
-    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, 0)])
+    rows, columns = np.nonzero(cut.alpha > 0)
+    half = (cut.alpha.shape[0] - 1) / 2
+    # The grid's places that hold something of the object, and one more all around.
+    low, high = (
+        (np.array([end(columns), end(rows)]) - half + one) * cut.step * scale
+        for end, one in ((np.min, -1), (np.max, 1))
+    )
+    corners = np.array([low, (high[0], low[1]), high, (low[0], high[1]), (0, 0)])
     found: list[tuple[slice, slice] | None] = []
     for frame in frames(placed):
         pixels, front = project(placed.image_from_plane, corners @ frame[:2, :2].T + frame[:2, 2])
@@ -58,17 +71,23 @@ def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> A
 
 def object_masks(
     placed: Placed, cut: Cutout, *, wider: float = 1.0
-) -> list[tuple[tuple[slice, slice], Floats]]:
+) -> Iterator[tuple[tuple[slice, slice], Floats]]:
     """For each object in sight its window and how much of each pixel it covers; `wider` scales it."""
-    found: list[tuple[tuple[slice, slice], Floats]] = []
-    for frame, window in zip(frames(placed), windows(placed, cut), strict=True):
+    plane_from_image = np.linalg.inv(placed.image_from_plane)
+    half = (cut.alpha.shape[0] - 1) / 2
+    grid_from_local = np.diag([1 / (cut.step * wider), 1 / (cut.step * wider), 1.0])
+    grid_from_local[:2, 2] = half
+    for frame, window in zip(frames(placed), windows(placed, cut, scale=wider), strict=True):
         if window is None:
             continue
         rows, columns = window
-        local = local_points(placed, frame, window) / wider
-        shape = (rows.stop - rows.start, columns.stop - columns.start)
-        found.append((window, cut.at(local).reshape(shape)))
-    return found
+        image_from_window = np.eye(3)
+        image_from_window[:2, 2] = columns.start, rows.start
+        matrix = grid_from_local @ np.linalg.inv(frame) @ plane_from_image @ image_from_window
+        size = (columns.stop - columns.start, rows.stop - rows.start)
+        # Beyond the grid nothing lies: the border is 0.
+        how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        yield window, np.asarray(cv2.warpPerspective(cut.alpha, matrix, size, flags=how), np.float32)
 
 
 def covered(placed: Placed, cut: Cutout) -> Mask:
@@ -85,36 +104,82 @@ def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask, cut: Cut
     ground = valid & ~objects
     if not ground.any():
         return pixels
-    known = np.where(ground[:, :, None], pixels, np.float32(0))
-    sigma = max(1.0, _BLUR * _pitch_px(placed))
-    weight = cv2.GaussianBlur(ground.astype(np.float32), (0, 0), sigma)
-    even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(weight, 1e-4)[:, :, None]
-    # The ground's light, carried under the objects as a membrane is: by diffusion from all sides.
-    under = filled(np.where(ground[:, :, None], even, np.float32(0)), ground)
+    even, under = _light(pixels, ground, sigma=max(1.0, _BLUR * _pitch_px(placed)))
+    result = pixels.copy()
+    detail = np.subtract(pixels, even, out=even)
+    detail[~ground] = 0
+    inner = cv2.erode(ground.astype(np.uint8), np.ones((3, 3), np.uint8))
+    moves = [_move(placed, each) for each in _half_steps(placed)]
+    # In strips: what is looked up for each pixel takes more memory than the photo.
+    for start in range(0, len(objects), _STRIP):
+        rows = slice(start, start + _STRIP)
+        wanted = objects[rows]
+        if not wanted.any():
+            continue
+        texture = _texture(detail, inner, moves, wanted, top=start)
+        grown = under[rows][wanted] + np.clip(texture[wanted], -_MOST_TEXTURE, _MOST_TEXTURE)
+        result[rows][wanted] = np.clip(grown, 0, 1)
+    return result
+
+
+def _light(pixels: Floats, ground: Mask, *, sigma: float) -> tuple[Floats, Floats]:
+    """The ground's light, smooth over `sigma` pixels, and the same carried on under what is no ground.
+
+    Both [H, W, 3]. What is that smooth is known from a reduced picture as well.
+    """
+    height, width = ground.shape
+    reduce = 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
+    known, weight = np.where(ground[:, :, None], pixels, np.float32(0)), ground.astype(np.float32)
+    size = (max(1, -(-width // reduce)), max(1, -(-height // reduce)))
+    if reduce > 1:
+        known, weight = (cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in (known, weight))
+        sigma = sigma * size[0] / width
+    spread = cv2.GaussianBlur(weight, (0, 0), sigma)
+    even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(spread, 1e-4)[:, :, None]
+    # Carried under the objects as a membrane is: by diffusion from all sides.
+    fixed = weight >= 0.5
+    under = filled(np.where(fixed[:, :, None], even, np.float32(0)), fixed)
     for _ in range(_DIFFUSIONS):
-        under = np.where(ground[:, :, None], even, cv2.GaussianBlur(under, (0, 0), sigma))
-    detail = np.where(ground[:, :, None], pixels - even, np.float32(0))
-    texture = _texture(detail, ground, placed, objects)
-    return np.where(
-        objects[:, :, None], np.clip(under + np.clip(texture, -_MOST_TEXTURE, _MOST_TEXTURE), 0, 1), pixels
-    ).astype(np.float32)
+        under = np.where(fixed[:, :, None], even, cv2.GaussianBlur(under, (0, 0), sigma))
+    if reduce > 1:
+        even, under = (
+            cv2.resize(each, (width, height), interpolation=cv2.INTER_LINEAR) for each in (even, under)
+        )
+    return np.asarray(even, np.float32), np.asarray(under, np.float32)
 
 
-def _texture(detail: Floats, ground: Mask, placed: Placed, objects: Mask) -> Floats:
-    """What the ground half a step away has beside its smooth part, for the pixels of `objects`."""
-    found = np.zeros_like(detail)
-    rows, columns = np.nonzero(objects)
-    left = np.ones(len(rows), bool)
-    points, _ = project(np.linalg.inv(placed.image_from_plane), np.stack([columns, rows], 1).astype(float))
-    inner = cv2.erode(ground.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    for move in _half_steps(placed):
-        at, front = project(placed.image_from_plane, points[left] + move)
-        x, y = np.rint(at).astype(int).T
-        inside = front & (x >= 0) & (y >= 0) & (x < ground.shape[1]) & (y < ground.shape[0])
-        inside[inside] = inner[y[inside], x[inside]]
-        places = np.flatnonzero(left)[inside]
-        found[rows[places], columns[places]] = detail[y[inside], x[inside]]
-        left[places] = False
+def _move(placed: Placed, step: Array) -> Array:
+    """A step on the plane as the homography [3, 3] of the photo; its third coordinate is > 0 in front."""
+    moved = np.eye(3)
+    moved[:2, 2] = step
+    return placed.image_from_plane @ moved @ np.linalg.inv(placed.image_from_plane)
+
+
+def _texture(detail: Floats, inner: NDArray[Any], moves: list[Array], wanted: Mask, *, top: int) -> Floats:
+    """What the ground half a step away has beside its smooth part: [h, W, 3], 0 where nothing is `wanted`.
+
+    `wanted` [h, W] is a strip of the photo from row `top` on; `detail` [H, W, 3] is read where `inner` is 1.
+    """
+    found = np.zeros((*wanted.shape, 3), np.float32)
+    left = wanted.copy()
+    photo_from_strip = np.array([[1, 0, 0], [0, 1, top], [0, 0, 1.0]])
+    how = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    for move in moves:
+        rows, columns = (np.flatnonzero(left.any(axis)) for axis in (1, 0))
+        if not len(rows):
+            break
+        # Only where something is left.
+        part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        corner = np.array([[1, 0, part[1].start], [0, 1, part[0].start], [0, 0, 1.0]])
+        matrix = move @ photo_from_strip @ corner
+        size = (part[1].stop - part[1].start, part[0].stop - part[0].start)
+        depth = (
+            matrix[2, 0] * np.arange(size[0]) + (matrix[2, 1] * np.arange(size[1]) + matrix[2, 2])[:, None]
+        )
+        shown = (cv2.warpPerspective(inner, matrix, size, flags=how) > 0) & (depth > 1e-9) & left[part]
+        if shown.any():
+            found[part][shown] = cv2.warpPerspective(detail, matrix, size, flags=how)[shown]
+            left[part] &= ~shown
     return found
 
 
