@@ -5,7 +5,8 @@ python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then
 python benchmarks/refusals.py --out scores.json        # every score, by kind of pattern
 
 Every family of the search (lattices, rings, ...) looks at every picture, and the best score that each reaches
-is kept, refused or not. The crops are drawn from a seed, so every run sees the same; a crop that shares more
+is kept. A picture is answered, as `p3i.synth` does, where an answer reaches the score and explains more bits
+than it costs. The crops are drawn from a seed, so every run sees the same; a crop that shares more
 than half of their joint area with an earlier one of its photo is drawn anew. It needs scikit-image (the extra
 `bench`), but downloads nothing.
 """
@@ -27,6 +28,7 @@ import robustness
 import p3i
 from p3i.errors import P3IError
 from p3i.interp.camera import Camera
+from p3i.search.choose import by_explained
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.result import NEEDED
@@ -93,11 +95,12 @@ class Scores:
     name: str
     pattern: bool
     best: dict[str, float] = field(default_factory=dict)
+    answered: bool = False
     seconds: float = 0.0
 
     @property
     def highest(self) -> float:
-        """The score by which the picture is answered or refused."""
+        """The best score of all families."""
         return max(self.best.values(), default=0.0)
 
 
@@ -206,19 +209,23 @@ def measure(images: Iterable[tuple[str, Image]], config: SearchConfig, *, patter
         begun = time.process_time()
         try:
             evidence = Evidence(image, config, focal_of(image, config)[0])
-            best = {
-                family.structure: _best(family.find(Session(evidence, config)))
+            session = Session(evidence, config)
+            answers = {
+                family.structure: family.find(session)
                 for family in FAMILIES
                 if config.structure in ("auto", family.structure)
             }
+            explained = by_explained(evidence, list(answers.values()), needed=NEEDED)
         except Exception as bug:
             print(f"{name:40} BUG {type(bug).__name__}: {bug}", flush=True)
             traceback.print_exc()
             continue
         seconds = round(time.process_time() - begun, 2)
-        found.append(Scores(name=name, pattern=pattern, best=best, seconds=seconds))
+        best = {structure: _best(some) for structure, some in answers.items()}
+        answered = any(answer.score >= NEEDED and answer.worth > 0 for answer in explained)
+        found.append(Scores(name=name, pattern=pattern, best=best, answered=answered, seconds=seconds))
         told = "  ".join(f"{structure} {score:.3f}" for structure, score in best.items())
-        said = "refused" if found[-1].highest < NEEDED else "answered"
+        said = "answered" if answered else "refused"
         print(f"{name:40} {told}  {said:8} {seconds:.1f} s", flush=True)
     return found
 
@@ -231,8 +238,9 @@ def summary(title: str, found: Sequence[Scores]) -> None:
     """Print how the scores are distributed, of each family and of the best of them."""
     if not found:
         return
-    refused = sum(scores.highest < NEEDED for scores in found)
-    print(f"\n{title}: {len(found)}, of which {refused} refused (a score below {NEEDED})")
+    refused = sum(not scores.answered for scores in found)
+    low = sum(scores.highest < NEEDED for scores in found)
+    print(f"\n{title}: {len(found)}, of which {refused} refused ({low} by a score below {NEEDED})")
     columns = {structure: [scores.best[structure] for scores in found] for structure in found[0].best}
     if len(columns) > 1:
         columns["best"] = [scores.highest for scores in found]
