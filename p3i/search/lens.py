@@ -142,19 +142,16 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
     cell_px = _spacing_px(pattern, index, matrix, side)
     noise = (_PIXEL_NOISE**2 + (_SHARE_NOISE * cell_px) ** 2).sqrt()
     free = free_numbers(pattern, theta)
-    places = torch.tensor(free.places)
-
-    selector = torch.eye(len(theta), dtype=torch.float64)[places]
 
     def points_of(moving: torch.Tensor) -> torch.Tensor:
-        numbers = theta + (moving[..., :-1] - theta[places]) @ selector
+        numbers = free.into(theta, moving[..., :-1])
         at = pattern.image_from_plane(numbers, size=canvas, focal_mm=focal_mm)
         straight, _ = project(at, pattern.points_at(index, numbers))
         return photo_from_straight(
             _shifted(straight, canvas, seen.photo_size), moving[..., -1, None, None], size=seen.photo_size
         )[0]
 
-    start = torch.cat([theta[places], torch.tensor([seen.k1], dtype=torch.float64)])
+    start = torch.cat([free.of(theta), torch.tensor([seen.k1], dtype=torch.float64)])
     prior = torch.zeros(len(start), 2, dtype=torch.float64)
     prior[-1, 1] = 1 / _PRIOR_SPREAD**2
     whiten = torch.eye(2, dtype=torch.float64) / noise[:, None, None]

@@ -1,8 +1,8 @@
 """Refinement: Gauss-Newton on the difference of all cells from their mean.
 
 Equation 2 compares neighbours only. Here every cell is compared with the mean of all, which is the same as
-comparing all pairs: the pairs that lie far apart are what makes the pose precise. The derivatives of where
-each sample falls come from the compiled generator (torch.func), so any sketch refines the same way.
+comparing all pairs: the pairs that lie far apart are what makes the pose precise. How each sample moves with
+the numbers comes from the compiled generator, so any sketch refines the same way.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from torch import Tensor
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import sample_grid, sample_points
 from p3i.search.evidence import Level
+from p3i.search.slopes import with_slopes
 from p3i.vision.warp import sample, sample_valid
 
 # One step moves the camera by at most this many degrees, ...
@@ -33,6 +34,15 @@ class FreeNumbers:
 
     places: tuple[int, ...]
     limits: tuple[float, ...]
+
+    def of(self, theta: Tensor) -> Tensor:
+        """The free numbers of theta [P]: [V]."""
+        return theta[list(self.places)]
+
+    def into(self, theta: Tensor, moving: Tensor) -> Tensor:
+        """theta [P] with these numbers [..., V] in the free places: [..., P]."""
+        selector = torch.eye(len(theta), dtype=theta.dtype)[list(self.places)]
+        return theta + (moving - self.of(theta)) @ selector
 
 
 def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> FreeNumbers:
@@ -76,36 +86,35 @@ def refine(
     grid = sample_grid()
     at = (index[:, None, :] + grid[None]).reshape(-1, 2)
     free = free_numbers(pattern, theta, fixed=fixed)
-    places, limits = torch.tensor(free.places), torch.tensor(free.limits, dtype=torch.float64)
+    limits = torch.tensor(free.limits, dtype=torch.float64)
     shape = (len(index), len(grid))
 
-    def points_of(moving: Tensor, base: Tensor) -> tuple[Tensor, Tensor]:
-        points, in_front = sample_points(level, pattern, base.index_put((places,), moving), at)
-        return points, torch.cat([points, in_front[:, None].to(points)], dim=1).detach()
+    def points_of(moving: Tensor) -> Tensor:
+        return sample_points(level, pattern, free.into(theta, moving), at)[0]
 
     for _ in range(iterations):
-        jacobian, seen = torch.func.jacfwd(points_of, has_aux=True)(theta[places], theta)
-        points = seen[:, :2].float()
-        known = (sample_valid(level.valid, points) & (seen[:, 2] > 0)).reshape(shape)
+        points, slopes = with_slopes(points_of, free.of(theta), limits)
+        in_front = sample_points(level, pattern, theta, at)[1]
+        points = points.float()
+        known = (sample_valid(level.valid, points) & in_front).reshape(shape)
         read = sample(level.stack, points).reshape(*shape, 3, level.channels)
         step = _step(
             read[:, :, 0],
             read[:, :, 1:],
-            jacobian.float().reshape(*shape, 2, len(places)),
+            slopes.float().reshape(*shape, 2, len(limits)),
             known * weights[:, None].float(),
-            scale=1 / limits.float(),
         ).double()
         if not bool(torch.isfinite(step).all()):
             break
         worst = float(step.abs().max())
-        theta = theta.index_put((places,), theta[places] + step * limits / max(1.0, worst))
+        theta = free.into(theta, free.of(theta) + step * limits / max(1.0, worst))
         if worst < _CONVERGED:
             break
     return theta
 
 
-def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor, *, scale: Tensor) -> Tensor:
-    """One damped Gauss-Newton step [P], in units of 1/scale.
+def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor) -> Tensor:
+    """One damped Gauss-Newton step [P], in units of those that the jacobian is by.
 
     values [N, K, C]; slopes [N, K, 2, C] per map pixel; jacobian [N, K, 2, P] in map pixels; weights [N, K].
     """
@@ -114,10 +123,10 @@ def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor, *, 
     typical = squared[weights > 0].median() if bool((weights > 0).any()) else squared.new_ones(())
     weights = weights / (1 + squared / (_ROBUST_SCALE**2 * typical + 1e-6))
     residual = values - _mean(values, weights)
-    rows = torch.einsum("nkdc,nkdp->nkcp", slopes, jacobian / scale)
+    rows = torch.einsum("nkdc,nkdp->nkcp", slopes, jacobian)
     rows = rows - _mean(rows, weights)  # the mean cell moves along
     root = weights.sqrt()[..., None]
-    rows = (rows * root[..., None]).reshape(-1, len(scale)).double()
+    rows = (rows * root[..., None]).reshape(-1, jacobian.shape[-1]).double()
     normal = rows.T @ rows
     right = rows.T @ (residual * root).reshape(-1).double()
     damped = normal + torch.diag(_DAMPING * normal.diagonal() + 1e-9 * normal.diagonal().max() + 1e-12)

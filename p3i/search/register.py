@@ -16,6 +16,7 @@ from p3i.interp.pattern import Pattern
 from p3i.search.cells import read_cells, sample_points
 from p3i.search.evidence import Level
 from p3i.search.refine import free_numbers
+from p3i.search.slopes import with_slopes
 
 SIDE = 12
 """Samples along a cell's side."""
@@ -28,8 +29,6 @@ _SHARE_NOISE = 0.02
 _PIXEL_NOISE = 0.25
 # Offsets beyond this many of those count less and less (a Cauchy weight).
 _ROBUST_SCALE = 2.0
-# The share of a limit by which numbers are nudged to tell derivatives.
-_NUDGE = 1e-4
 # An instance counts where its peak beats the rim of the search by this much.
 _LEAST_LEAD = 0.05
 
@@ -138,26 +137,23 @@ def fit_instances(
     Offsets are compared in index units, so that near and far objects count alike.
     """
     free = free_numbers(pattern, theta, fixed=fixed)
-    places, limits = torch.tensor(free.places), torch.tensor(free.limits, dtype=torch.float64)
     targets, _ = sample_points(level, pattern, theta, found.index + found.offsets)
     inverse, cell = _index_from_map(level, pattern, theta, found.index)
     noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()
 
-    selector = torch.eye(len(theta), dtype=torch.float64)[places]
-
     def points_of(moving: Tensor) -> Tensor:
-        return sample_points(level, pattern, theta + (moving - theta[places]) @ selector, found.index)[0]
+        return sample_points(level, pattern, free.into(theta, moving), found.index)[0]
 
     moved = robust_fit(
         points_of,
-        theta[places],
+        free.of(theta),
         targets=targets,
         whiten=inverse / noise[:, None, None],
         weights=weights,
-        limits=limits,
+        limits=torch.tensor(free.limits, dtype=torch.float64),
         iterations=iterations,
     )
-    return theta.index_put((places,), moved)
+    return free.into(theta, moved)
 
 
 def robust_fit(
@@ -179,16 +175,10 @@ def robust_fit(
     (1 / variance) for each number.
     """
     moving = start
-    # Central differences, all numbers in one batch of the generator: a tenth of what dual numbers cost, and
-    # in double precision as good.
-    nudges = torch.diag(_NUDGE * limits)
-    nudges = torch.cat([torch.zeros_like(start)[None], nudges, -nudges])
     for _ in range(iterations):
-        seen = points_of(moving + nudges)
-        points, (ahead, behind) = seen[0], seen[1:].chunk(2)
-        jacobian = ((ahead - behind) / (2 * _NUDGE)).permute(1, 2, 0)  # by a step of each number's limit
+        points, slopes = with_slopes(points_of, moving, limits)
         residual = torch.einsum("nij,nj->ni", whiten, points - targets)
-        rows = torch.einsum("nij,njp->nip", whiten, jacobian)
+        rows = torch.einsum("nij,njp->nip", whiten, slopes)
         distance = residual.square().sum(1)
         weight = (weights / (1 + distance / _ROBUST_SCALE**2)).sqrt()
         a = (rows * weight[:, None, None]).reshape(-1, len(start))

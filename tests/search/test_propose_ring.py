@@ -45,6 +45,17 @@ def test_proposals_come_best_first(proposals: list[RingProposal]) -> None:
     assert [one.worth for one in proposals] == sorted((one.worth for one in proposals), reverse=True)
 
 
+def test_no_proposal_says_what_a_better_one_said_and_none_is_hopeless(proposals: list[RingProposal]) -> None:
+    """Climbs from several centres end at this ring, and each would tell of it and of its neighbours."""
+    assert all(one.worth > 0.02 * proposals[0].worth for one in proposals)
+    told = [(one.count, *one.center, one.radius, one.rx_deg, one.ry_deg) for one in proposals]
+    for place, one in enumerate(told):
+        for other in told[:place]:
+            same_count = one[0] == other[0]
+            apart = np.abs(np.subtract(one[1:], other[1:])) > (1, 1, 1, 2, 2)
+            assert not same_count or apart.any()
+
+
 def test_a_double_angle_turns_twice_as_fast_as_an_edge() -> None:
     """Black beside white: the gradient points along the ramp, and a half turn of it is no turn."""
     rows, columns = np.mgrid[0:40, 0:40].astype(np.float32)

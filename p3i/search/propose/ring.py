@@ -53,6 +53,11 @@ _SPOTS_WORTH = 0.15
 _STEP_DEG = 6.0
 _STEP_SHARE = 0.08
 _CLIMBS = 6
+# Proposals are one where centre and radius differ by less than this share of the radius, and poses by less.
+_SAME_SHARE = 0.04
+_SAME_POSE_DEG = 3.0
+# Proposals worth less than this share of the best are not told.
+_LEAST_SHARE = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +128,28 @@ def ring_proposals(evidence: Evidence, *, seed: int = 0) -> list[RingProposal]:
             pose = vote.rx_deg, vote.ry_deg
             worth = row.worth * math.sqrt(vote.worth)
             found.append(RingProposal(*pose, evidence.focal_mm, center, row.radius, row.count, worth))
-    return sorted(found, key=lambda proposal: -proposal.worth)
+    return _distinct(sorted(found, key=lambda proposal: -proposal.worth))
+
+
+def _distinct(proposals: list[RingProposal]) -> list[RingProposal]:
+    """Without those that a better one says already, as climbs from several centres often end at the same, and
+    without the hopeless."""
+    kept: list[RingProposal] = []
+    for one in proposals:
+        if one.worth > _LEAST_SHARE * proposals[0].worth and not any(_same(one, other) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _same(one: RingProposal, other: RingProposal) -> bool:
+    """Whether two proposals are so close that their fits end at the same ring."""
+    near = _SAME_SHARE * other.radius
+    return (
+        one.count == other.count
+        and float(np.hypot(*(one.center - other.center))) < near
+        and abs(one.radius - other.radius) < near
+        and math.hypot(one.rx_deg - other.rx_deg, one.ry_deg - other.ry_deg) < _SAME_POSE_DEG
+    )
 
 
 def _promise(centre: tuple[Vote, list[Rows]]) -> float:
