@@ -36,5 +36,10 @@ def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], -1)
     smaller_weight = cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     coarse = cv2.resize(_push_pull(smaller, smaller_weight), (width, height), interpolation=cv2.INTER_LINEAR)
+    # value where it is known, else coarse + weight * (value - coarse), without further copies.
     coarse = coarse.reshape(value.shape)
-    return np.where(weight[:, :, None] >= 1, value, coarse + weight[:, :, None] * (value - coarse))
+    value -= coarse
+    value *= weight[:, :, None]
+    value += coarse
+    np.copyto(value, weighted, where=weight[:, :, None] >= 1)
+    return value
