@@ -26,10 +26,11 @@ def nearest(placed: Placed, points: Array) -> NDArray[np.int64]:
     part = max(1, _PART // max(1, len(placed.points)))
     centers = placed.points
     squares = (centers**2).sum(1)
-    found = [
-        np.argmin(squares - 2 * points[start : start + part] @ centers.T, axis=1)
-        for start in range(0, len(points), part)
-    ]
+    found = []
+    for start in range(0, len(points), part):
+        away = points[start : start + part] @ (-2 * centers.T)
+        away += squares
+        found.append(np.argmin(away, axis=1))
     return np.concatenate(found) if found else np.zeros(0, np.int64)
 
 

@@ -150,7 +150,9 @@ def extend(
         left_over = unlike
     bare |= left_over
     if bare.any():
-        pixels = np.where(bare[:, :, None], filled(pixels, (known | hole) & ~bare), pixels)
+        # Channel by channel: at once it takes as much memory as all the rest.
+        for channel in np.split(pixels, 3, axis=2):
+            np.copyto(channel, filled(channel, (known | hole) & ~bare), where=bare[:, :, None])
     pixels[inside] = photo.pixels
     smooth = float(bare.sum() / hole.sum())
     wider = _program(program, wide, more, sides, laid.size)

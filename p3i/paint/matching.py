@@ -25,6 +25,9 @@ _RIDGE = 0.3
 # each of these: near the rim its own difference counts, further in that of more.
 _SMOOTH = 0.125
 _SCALES = (0.5, 1.0, 2.0, 4.0)
+# Where the finest smoothing is over this many pixels the rim is reduced first, until it is over so many.
+_COARSE_SIGMA = 16.0
+_LEAST_SIGMA = 4.0
 
 
 def matched_light(colours: NDArray, wanted: NDArray, weights: NDArray) -> tuple[Array, Array]:
@@ -70,6 +73,18 @@ def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:
 
     `rim` [h, w] is 1 on the rim, else 0; `spacing_px` is how far the next object lies. 0 without a rim.
     """
+    height, width = rim.shape
+    finest = _SCALES[0] * _SMOOTH * spacing_px
+    if finest >= _COARSE_SIGMA:
+        # What is smooth over so many pixels is known from a reduced picture as well.
+        reduce = 2 ** int(np.log2(finest / _LEAST_SIGMA))
+        size = (-(-width // reduce), -(-height // reduce))
+        small, small_rim = (
+            np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.float32)
+            for plane in (off, rim)
+        )
+        found = carried(small, small_rim, spacing_px=spacing_px / reduce)
+        return np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
     total, weight = np.zeros_like(off), np.zeros_like(rim)
     for scale in _SCALES:
         sigma = max(0.7, scale * _SMOOTH * spacing_px)

@@ -66,7 +66,9 @@ def fill_by_stack(
         context[rows[seen], columns[seen]] = True
         before[rows[seen], columns[seen]] = True
     if bare.any():
-        result[bare] = filled(result, context)[bare]
+        # Channel by channel: at once it takes as much memory as all the rest.
+        for channel in np.split(result, 3, axis=2):
+            np.copyto(channel, filled(channel, context), where=bare[:, :, None])
     return result, bare
 
 
@@ -85,12 +87,16 @@ def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
     deep = None
     for piece in np.split(points, ends):
         on_plane, _ = project(plane_from_image, piece)
-        cells = placed.index[nearest(placed, on_plane)]
-        if len(np.unique(cells, axis=0)) <= _MOST_CELLS:
+        numbers = nearest(placed, on_plane)
+        cells = np.flatnonzero(np.bincount(numbers, minlength=len(placed.index)))
+        if len(cells) <= _MOST_CELLS:
             found.append(piece)
             continue
-        blocks, members = np.unique(cells // 2, axis=0, return_inverse=True)
-        parts = [piece[members.reshape(-1) == block] for block in range(len(blocks))]
+        blocks, block_of = np.unique(placed.index[cells] // 2, axis=0, return_inverse=True)
+        members = np.zeros(len(placed.index), np.int64)
+        members[cells] = block_of.reshape(-1)
+        members = members[numbers]
+        parts = [piece[members == block] for block in range(len(blocks))]
         if deep is None:
             deep = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
         depths = [float(deep[tuple(part.astype(int).T[::-1])].mean()) for part in parts]
