@@ -5,6 +5,7 @@ import re
 import numpy as np
 from truth import SMALL, pose_error_deg, small_scene
 
+from p3i.evaluation.lattice_scenes import lattice_scene
 from p3i.search.config import SearchConfig
 from p3i.search.synthesize import synthesize
 from p3i.vision.image import Image
@@ -13,10 +14,14 @@ LEFT, RIGHT = 3, 18
 
 
 def side_by_side() -> Image:
+    return beside(small_scene(LEFT).pixels, small_scene(RIGHT).pixels)
+
+
+def beside(left: np.ndarray, right: np.ndarray) -> Image:
     """The left half of one scene and the right half of another, whose planes differ."""
-    pixels = small_scene(LEFT).pixels.copy()
-    half = SMALL.width // 2
-    pixels[:, half:] = small_scene(RIGHT).pixels[:, half:]
+    pixels = left.copy()
+    half = pixels.shape[1] // 2
+    pixels[:, half:] = right[:, half:]
     return Image(pixels.astype(np.float32) / 255, np.ones(pixels.shape[:2], bool))
 
 
@@ -33,6 +38,12 @@ def test_another_plane_is_told_of_with_its_place() -> None:
     assert (int(place[1]) > SMALL.width / 2) == (of_left < of_right), "it lies on the other side"
     corners = np.array(result.region)
     assert (corners[:, 0].mean() < SMALL.width / 2) == (of_left < of_right)
+
+
+def test_a_plane_on_which_nothing_grew_is_looked_for_beyond_the_answer() -> None:
+    image = beside(lattice_scene(35).pixels, lattice_scene(59).pixels)
+    result = synthesize(image, SearchConfig(structure="lattice"))
+    assert any("another plane carries a pattern" in note for note in result.notes), result.notes
 
 
 def test_of_a_single_pattern_nothing_is_told() -> None:
