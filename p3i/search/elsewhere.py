@@ -1,12 +1,10 @@
 """Other patterns on the same photo: the answer is the dominant one, and says where another lies.
 
 A photo of a house's corner shows two facades, of a room floor and wall. One program has one plane, so the
-others are told as a note. Most come for free: fits that grew elsewhere while the answer's was looked for. If
-there is none, the most promising window beyond the answer's region is grown.
+others are told as a note. They come for free: fits that grew elsewhere while the answer's was looked for.
 """
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Callable
 
@@ -18,8 +16,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import sample_points
 from p3i.search.evidence import Evidence
-from p3i.search.grow import Fit, grow
-from p3i.search.propose.lattice import Proposal
+from p3i.search.grow import Fit
 from p3i.search.region import centers_px, region_px
 from p3i.search.result import NEEDED
 from p3i.search.session import Answer, Session
@@ -30,27 +27,17 @@ _MOST_INSIDE = 0.3
 _LEAST_SCORE = 0.02
 # ... and planes whose normals differ by more than this are two.
 _OTHER_PLANE_DEG = 8.0
-# A window is looked at where its middle lies this share of the longer side beyond the region, and where it
-# promises at least this share of what the best one does.
-_CLEAR = 0.05
-_LEAST_PROMISE = 0.35
 
 Finish = Callable[[Session, Pattern, Fit], Answer | None]
 
 
 def with_note_of_others(
-    session: Session,
-    pattern: Pattern,
-    fits: list[Fit],
-    windows: list[Proposal],
-    answers: list[Answer],
-    *,
-    finish: Finish,
+    session: Session, pattern: Pattern, fits: list[Fit], answers: list[Answer], *, finish: Finish
 ) -> list[Answer]:
     """The answers, the best first, of which the first says whether another pattern lies beside its own.
 
-    `fits` are all that were grown and `windows` all local proposals, the best first; `finish` works a fit out
-    to a program. A pattern is told of only where its own program reaches what an answer needs.
+    `fits` are all that were grown, the best first; `finish` works one out to a program. A pattern is told of
+    only where its own program reaches what an answer needs.
     """
     if not answers or answers[0].score < NEEDED:
         return answers
@@ -59,32 +46,15 @@ def with_note_of_others(
     for other in answers[1:]:
         if other.score >= NEEDED and _inside(region, _centers(evidence, other)) <= _MOST_INSIDE:
             return [_noted(evidence, first, other), *answers[1:]]
-    beyond = (
-        grow(evidence, pattern, window, generator=session.generator)
-        for window in _beyond(evidence, windows, region)
-    )
-    for fit in itertools.chain(fits, beyond):
-        if not session.go_on():
+    for fit in fits:
+        if fit.score < _LEAST_SCORE or not session.go_on():
             break
-        if fit is None or fit.score < _LEAST_SCORE:
-            continue
         if _inside(region, _cells_px(evidence, pattern, fit)) > _MOST_INSIDE:
             continue
         other = finish(session, pattern, fit)
         if other is not None and other.score >= NEEDED:
             return [_noted(evidence, first, other), *answers[1:]]
     return answers
-
-
-def _beyond(evidence: Evidence, windows: list[Proposal], region: np.ndarray) -> list[Proposal]:
-    """The window well beyond the answer's region [M, 2] that promises most, if it promises enough."""
-    size = evidence.image.size
-    promising = [window for window in windows if window.worth >= _LEAST_PROMISE * windows[0].worth]
-    for window in promising if len(region) >= 3 else ():
-        x, y = np.array(size.middle) + window.lattice.origin * size.unit_px  # windows are seen straight on
-        if cv2.pointPolygonTest(region, (float(x), float(y)), True) < -_CLEAR * size.longer:
-            return [window]
-    return []
 
 
 def _noted(evidence: Evidence, first: Answer, other: Answer) -> Answer:

@@ -41,11 +41,8 @@ def find_lattices(session: Session) -> list[Answer]:
     """The lattices of a photo as finished programs, the most worth first."""
     pattern = lattice_pattern()
     fits: list[Fit] = []
-    windows: list[Proposal] = []
     try:
-        session.tell("looking through windows", 0.02)
-        windows += window_proposals(session.evidence)
-        _grow_all(session, pattern, windows, fits)
+        _grow_all(session, pattern, fits)
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
     fits.sort(key=lambda fit: -worth(fit))
@@ -57,7 +54,7 @@ def find_lattices(session: Session) -> list[Answer]:
         if fits and not answers:
             _finish_all(session, pattern, fits[:1], answers)
     answers.sort(key=lambda answer: -answer.worth)
-    return with_note_of_others(session, pattern, fits, windows, answers, finish=_finished)
+    return with_note_of_others(session, pattern, fits, answers, finish=_finished)
 
 
 def worth(fit: Fit) -> float:
@@ -70,9 +67,10 @@ def worth(fit: Fit) -> float:
     return fit.score * float(contrast.mean()) * beyond_chance
 
 
-def _grow_all(session: Session, pattern: Pattern, windows: list[Proposal], fits: list[Fit]) -> None:
+def _grow_all(session: Session, pattern: Pattern, fits: list[Fit]) -> None:
     """Grow the proposals, the promising ones first and none twice; the fits go into `fits`."""
-    windows = windows[:_MOST_PROPOSALS]
+    session.tell("looking through windows", 0.02)
+    windows = window_proposals(session.evidence)[:_MOST_PROPOSALS]
     session.tell("straightening", 0.1)
     views = straightened_proposals(session.evidence)[:_MOST_PROPOSALS]
     most = {kind[0].local: kind[0].worth for kind in (views, windows) if kind}

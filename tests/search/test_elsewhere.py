@@ -40,7 +40,7 @@ def test_another_plane_is_told_of_with_its_place() -> None:
     assert (corners[:, 0].mean() < SMALL.width / 2) == (of_left < of_right)
 
 
-def test_a_plane_on_which_nothing_grew_is_looked_for_beyond_the_answer() -> None:
+def test_a_plane_whose_cells_reach_into_the_answers_region_is_told_of_too() -> None:
     image = beside(lattice_scene(35).pixels, lattice_scene(59).pixels)
     result = synthesize(image, SearchConfig(structure="lattice"))
     assert any("another plane carries a pattern" in note for note in result.notes), result.notes
