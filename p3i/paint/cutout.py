@@ -73,6 +73,9 @@ class Cutout:
     """The object of a program's cells: `alpha` float32 [side, side], 1 on it, soft at its edge.
 
     `room` is how much ground lies between it and the cell's border, where they are closest, in distances.
+    `uneven` is how much the ground at that border differs from place to place, as a share of the difference
+    between object and ground; `unlike` how far a typical object is from the median cell, as a share of the
+    contrast within that.
 
     `step` is the grid's distance in program units; `mean` [side, side, 3] the median cell; `misfit` [M] how
     far each object of the program is from it, inf for those not seen wholly. `clear` says whether the object
@@ -85,6 +88,8 @@ class Cutout:
     misfit: Array
     clear: bool
     room: float
+    uneven: float
+    unlike: float
 
     @property
     def radius(self) -> float:
@@ -131,7 +136,18 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
         reach = np.hypot(local[:, 0], local[:, 1]).reshape(_SIDE, _SIDE)
         alpha = np.clip((_ASSUMED * spacing - reach) / (0.05 * spacing) + 0.5, 0, 1).astype(np.float32)
     room = max(0.0, float(own[alpha > 0.5].min(initial=0.5)))
-    return Cutout(alpha, mean, step, misfit, clear, room)
+    uneven = _unevenness(mean, alpha > 0.5, own)
+    contrast = float(mean[own > 0].std(axis=0).mean())
+    unlike = float(np.median(misfit[whole])) / max(contrast, 1e-6) if whole.sum() > 1 else 0.0
+    return Cutout(alpha, mean, step, misfit, clear, room, uneven, unlike)
+
+
+def _unevenness(mean: Floats, thing: Mask, own: Array) -> float:
+    """The spread of the ground's colour at the cell's border over its distance from the object's (Lab)."""
+    colours = lab_of(mean)
+    ground = colours[(own > -_BORDER) & (own < _BORDER)]
+    apart = float(np.linalg.norm(colours[thing].mean(0) - ground.mean(0))) if thing.any() else 0.0
+    return float(np.linalg.norm(ground.std(0))) / max(apart, 1e-6)
 
 
 def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:

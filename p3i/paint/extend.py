@@ -25,10 +25,11 @@ from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
 from p3i.grammar.printer import format_program
 from p3i.paint.continued import Continued, continued, widened
+from p3i.paint.cutout import cutout
 from p3i.paint.extend_options import SIDES, ExtendOptions, Margins
 from p3i.paint.outlines import chart_of, polygons
 from p3i.paint.picture import Picture, opacity, repainted
-from p3i.paint.placed import Placed, placed
+from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.stack import fill_by_stack
 from p3i.records import changed
 from p3i.size import Size
@@ -46,6 +47,8 @@ Sides = tuple[int, int, int, int]
 _LEAST_TO_HORIZON = 0.02
 # A new picture has many pieces: fewer objects are tried for each than for a hole.
 _MOST_TRIED = 24
+# Objects that differ from one another by more than this share of their own contrast give ghosts.
+_MOST_UNLIKE = 0.8
 # Pieces that nothing in the photo was like are tried again beside those that were filled.
 _ROUNDS = 3
 
@@ -109,15 +112,19 @@ def extend(
 ) -> Extended:
     """The photo continued beyond its frame by `program`; `changes` are fields of ExtendOptions.
 
-    Raises UsageError where the new picture would reach the horizon or be too large, and for a photo that its
-    lens bends; ProgramError for a program without objects.
+    A photo that its lens bends (header key lens_k1) is straightened first: then its own pixels are resampled,
+    and what the straight picture lacks inside the frame is filled as well.
+
+    Raises UsageError where the new picture would reach the horizon or be too large; ProgramError for a
+    program without objects.
     """
     asked: ExtendOptions = changed(options or ExtendOptions(), changes, verb="extend")
+    lacking, notes = np.zeros_like(photo.valid), list[str]()
     if program.header and program.header.lens_k1:
-        raise UsageError(
-            "the program's lens_k1 says that the lens bends this photo, and extend continues straight ones: "
-            "`p3i rectify --crop same`, or a lens correction, straightens it first"
-        )
+        flat = straight(photo, program)
+        lacking = ~straight(dataclasses.replace(photo, valid=np.ones_like(photo.valid)), program).valid
+        photo = dataclasses.replace(flat, valid=flat.valid | lacking)
+        notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
     laid = placed(program, photo, focal_mm=asked.focal_mm)
     sides = margins_px(laid, asked.by)
     left, top, right, bottom = sides
@@ -133,9 +140,9 @@ def extend(
     pixels = np.zeros((size.height, size.width, 3), np.float32)
     known = np.zeros((size.height, size.width), bool)
     inside = _window(sides, photo.size)
-    pixels[inside], known[inside] = photo.pixels, photo.valid
+    pixels[inside], known[inside] = photo.pixels, photo.valid & ~lacking
     hole = np.ones_like(known)
-    hole[inside] = False
+    hole[inside] = lacking
     pattern = hole & _ground(wide, len(laid.index), more)
     bare = hole & ~pattern
     left_over = pattern
@@ -153,12 +160,16 @@ def extend(
         # Channel by channel: at once it takes as much memory as all the rest.
         for channel in np.split(pixels, 3, axis=2):
             np.copyto(channel, filled(channel, (known | hole) & ~bare), where=bare[:, :, None])
-    pixels[inside] = photo.pixels
+    pixels[inside] = np.where(lacking[:, :, None], pixels[inside], photo.pixels)
     smooth = float(bare.sum() / hole.sum())
     wider = _program(program, wide, more, sides, laid.size)
-    return Extended(
-        photo, pixels, sides, wide, len(more.index), smooth, wider, tuple(_notes(smooth, more, wider, sides))
-    )
+    notes += _notes(smooth, more, wider, sides)
+    if len(more.index) and cutout(laid, photo).unlike > _MOST_UNLIKE:
+        notes.append(
+            "look at what was added: the photo's objects differ much from one another, and mixtures of them "
+            "look like ghosts"
+        )
+    return Extended(photo, pixels, sides, wide, len(more.index), smooth, wider, tuple(notes))
 
 
 def margins_px(laid: Placed, by: Margins) -> Sides:

@@ -16,6 +16,7 @@ from p3i.paint.edit import edit
 from p3i.paint.edit_options import parse_scale
 from p3i.paint.placed import placed
 from p3i.vision.image import Image, read_image
+from p3i.vision.sheet import project
 from p3i.vision.write import write_image
 
 SPARSER = LATTICE.replace("9*i", "18*i").replace("range(-4, 5)", "range(-2, 3)")
@@ -118,6 +119,40 @@ def test_a_cell_without_an_object_is_said_to_have_none() -> None:
     found = edit(plain, loads(LATTICE), loads(SPARSER))
     assert any("no object stands out" in note for note in found.notes)
     assert wrong(found.pixels, plain.pixels, found.touched) < 1
+
+
+@pytest.mark.parametrize(
+    ("radius", "striped", "coloured", "says"),
+    [
+        (3.2, False, False, None),
+        (3.2, True, False, "no even ground"),
+        (3.2, False, True, "differ much"),
+        (4.15, False, False, "borders"),
+    ],
+)
+def test_a_note_says_where_an_edit_is_not_to_be_relied_on(
+    radius: float, striped: bool, coloured: bool, says: str | None
+) -> None:
+    size = drawn(LATTICE).size
+    laid = placed(loads(LATTICE), drawn(LATTICE))
+    x, y = np.meshgrid(np.arange(size.width), np.arange(size.height))
+    plane, _ = project(np.linalg.inv(laid.image_from_plane), np.stack([x, y], -1).astype(float))
+    pixels = np.full((size.height, size.width, 3), 0.75, np.float32)
+    if striped:
+        # Bars between the objects, along one direction only: part of the ground, but not even.
+        pixels[np.abs((plane[..., 0] - laid.origin[0]) % 9 - 4.5) < 0.8] = (0.1, 0.3, 0.5)
+    random = np.random.default_rng(0)
+    for point in laid.points:
+        disc = np.hypot(*np.moveaxis(plane - point, -1, 0)) < radius
+        pixels[disc] = (0.2, 0.1, 0.3)
+        turn = random.uniform(0, 2 * np.pi)
+        upper = (plane - point) @ (np.cos(turn), np.sin(turn)) > 0
+        for half in (disc & upper, disc & ~upper) if coloured else ():
+            pixels[half] = random.integers(0, 2, 3)
+    found = edit(Image(pixels, np.ones(x.shape, bool)), loads(LATTICE), loads(SPARSER))
+    doubts = [note for note in found.notes if "look at the result" in note]
+    assert len(doubts) == (says is not None)
+    assert says is None or says in doubts[0]
 
 
 def test_a_bent_photo_is_edited_where_it_is_straight() -> None:

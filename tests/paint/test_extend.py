@@ -10,12 +10,14 @@ from marked import LATTICE, RING, drawn
 from p3i import loads
 from p3i.cli.main import run
 from p3i.errors import UsageError
-from p3i.grammar.ast import Affine, Program
+from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
+from p3i.interp.lens import straight_from_photo
 from p3i.paint.extend import extend, margins_px
 from p3i.paint.extend_options import Margins, parse_margins
 from p3i.paint.placed import placed
 from p3i.vision.image import Image, read_image
+from p3i.vision.warp import pixel_grid, remapped
 from p3i.vision.write import write_image
 
 ENDLESS = LATTICE.replace("range(-4, 5)", "range(-14, 15)").replace("range(-3, 4)", "range(-10, 11)")
@@ -166,13 +168,49 @@ def test_margins_are_read_for_all_sides_or_each() -> None:
     assert parse_margins("2,0,1,0", option="--cells") == Margins(2, 0, 1, 0, "cells")
 
 
-def test_too_large_and_bent_pictures_are_refused() -> None:
+@pytest.mark.parametrize("k1", [-0.1, 0.1])
+def test_a_bent_photo_is_straightened_and_then_continued(k1: float) -> None:
+    whole = drawn(ENDLESS)
+    given = cropped(whole)
+    at = straight_from_photo(pixel_grid(given.size), k1, size=given.size).numpy() + MARGIN
+    bent = dataclasses.replace(given, pixels=remapped(whole.pixels, whole.valid, at)[0])
+    program = dataclasses.replace(on_crop(PART), header=Header(lens_k1=k1))
+    found = extend(bent, program, by=ALL_AROUND, focal_mm=FOCAL)
+    hole = outside(whole)
+    apart = np.abs(found.pixels - whole.pixels).mean(2) * 255
+    assert apart[hole].mean() < 7
+    assert apart[~hole].mean() < 7, "what the straight picture lacks inside the frame is filled as well"
+    corners = [
+        apart[y : y + 8, x : x + 8].mean() for x in (MARGIN, -MARGIN - 8) for y in (MARGIN, -MARGIN - 8)
+    ]
+    assert max(corners) < 10
+    assert np.abs(bent.pixels - given.pixels).mean() * 255 > 15, "the lens matters"
+    assert found.paint().alpha is None
+    assert any("straightened first" in note for note in found.notes)
+    assert found.program is not None and found.program.header is not None
+    assert found.program.header.lens_k1 is None
+
+
+@pytest.mark.parametrize("unlike", [False, True])
+def test_a_note_warns_of_ghosts_where_the_objects_differ_much(unlike: bool) -> None:
+    photo = drawn(ENDLESS)
+    random = np.random.default_rng(0)
+    rows, columns = np.mgrid[: photo.size.height, : photo.size.width]
+    pixels = photo.pixels.copy()
+    for x, y in placed(loads(ENDLESS), photo).centers_px()[0]:
+        disc = np.hypot(columns - x, rows - y) < 14
+        if unlike:
+            pixels[disc] = random.random(3)
+    given = cropped(dataclasses.replace(photo, pixels=pixels))
+    found = extend(given, on_crop(PART), by=Margins(20, 0, 0, 0), focal_mm=FOCAL)
+    assert found.added
+    assert any("ghosts" in note for note in found.notes) is unlike
+
+
+def test_too_large_pictures_are_refused() -> None:
     photo = drawn(LATTICE)
     with pytest.raises(UsageError, match="more than --max-px 1,000"):
         extend(photo, loads(LATTICE), max_px=1000)
-    header = "# /// p3p\n# version = 1\n# lens_k1 = -0.05\n# ///\n"
-    with pytest.raises(UsageError, match="lens"):
-        extend(photo, loads(header + LATTICE))
 
 
 def test_the_command_writes_the_picture_and_its_facts(
