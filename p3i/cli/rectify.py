@@ -71,7 +71,7 @@ def command(**given: Any) -> None:
     if outputs.picture is not None and edited is not None:
         returned = found.back(api.read_image(edited))
         picture = returned.picture
-        outputs.say(_remarks(returned.changed, outputs.kind), name=photo)
+        outputs.say((*returned.notes, *_remarks(returned.changed, outputs.kind)), name=photo)
     elif outputs.picture is not None:
         picture = found.paint()
     outputs.write(picture, found.record(), name=photo)

@@ -5,6 +5,7 @@ It is then read from the edited view, sharp and free of aliasing, and blended in
 read from was edited.
 """
 
+import cv2
 import numpy as np
 
 from p3i.errors import UsageError
@@ -17,6 +18,8 @@ from p3i.vision.resample import resample
 _LOSSY = {"JPEG", "WEBP", "MPO", "AVIF", "HEIF", "JPEG2000"}
 _LOSSY_TOLERANCE = 16.0
 """What a JPEG of good quality adds to a pixel, at most, of 255."""
+_COARSE = 48
+"""Pixels of the longer side in which a picture is told from another one."""
 
 
 def edited_pixels(painted: Picture, edited: Image, *, tolerance: float | None) -> np.ndarray:
@@ -45,8 +48,8 @@ def edited_pixels(painted: Picture, edited: Image, *, tolerance: float | None) -
 
 def back(
     photo: Image, view: Straightened, painted: Picture, edited: Image, *, tolerance: float | None
-) -> tuple[Picture, int]:
-    """The photo with what was edited in the view, and how many of its pixels changed.
+) -> tuple[Picture, int, float]:
+    """The photo with what was edited in the view, how many of its pixels changed, what share of the view.
 
     Raises UsageError where the edited picture is not of the view's size.
     """
@@ -75,7 +78,29 @@ def back(
         values[place] = np.where(shares > 0, mixed, old)
         changed = int((shares > 0).sum())
     source = photo.source
-    return Picture(values, alpha, source.icc, source.exif), changed
+    known = differs.size if painted.alpha is None else max(1, int((painted.alpha > 0).sum()))
+    return Picture(values, alpha, source.icc, source.exif), changed, float(differs.sum() / known)
+
+
+def likeness(painted: Picture, edited: Image) -> float:
+    """How an edited view's light correlates with that of the view as painted, both much reduced: -1 to 1."""
+    share = _COARSE / max(painted.size.width, painted.size.height)
+    size = tuple(max(4, round(side * share)) for side in (painted.size.width, painted.size.height))
+    known = np.ones(painted.values.shape[:2], bool) if painted.alpha is None else painted.alpha > 0
+    known &= edited.valid
+    weight = cv2.resize(known.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    first, second = (
+        cv2.resize(grey * known, size, interpolation=cv2.INTER_AREA)
+        for grey in (painted.values.mean(axis=2, dtype=np.float32), edited.pixels.mean(axis=2))
+    )
+    seen = weight > 0.5
+    if seen.sum() < 4:
+        return 1.0
+    first, second = (each[seen] / weight[seen] for each in (first, second))
+    spread = float(first.std() * second.std())
+    return (
+        float(((first - first.mean()) * (second - second.mean())).mean()) / spread if spread > 1e-9 else 1.0
+    )
 
 
 def _window(view: Straightened, differs: np.ndarray) -> tuple[int, int, Size]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from p3i.grammar.ast import Program
-from p3i.paint.back import back
+from p3i.paint.back import back, likeness
 from p3i.paint.framing import straightened
 from p3i.paint.picture import Picture, depth, opacity
 from p3i.paint.placed import placed
@@ -17,6 +17,11 @@ from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.resample import resample
+
+# An edited view of which more than this differs, or whose light has less to do with the view than this (of a
+# JPEG little differs by enough to count), may be another picture.
+_MOST_EDITED = 0.8
+_LEAST_ALIKE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,8 +61,15 @@ class Rectified:
         Pixels of the photo whose view did not change keep their value, to the bit. Raises UsageError where
         `edited` has another size than the view.
         """
-        picture, count = back(self.photo, self.view, self.paint(), edited, tolerance=self.options.tolerance)
-        return Returned(picture, count)
+        painted = self.paint()
+        picture, count, share = back(self.photo, self.view, painted, edited, tolerance=self.options.tolerance)
+        notes: list[str] = []
+        if share > _MOST_EDITED or likeness(painted, edited) < _LEAST_ALIKE:
+            notes.append(
+                f"{share:.0%} of the edited picture's pixels differ from the view: unless all was edited, "
+                "it was made with other options (the program, --crop, --as-seen, --scale, --cell, --focal)"
+            )
+        return Returned(picture, count, tuple(notes))
 
     def record(self) -> dict[str, Any]:
         """The geometry as plain JSON values; docs/rectify.md says what each means."""
@@ -93,10 +105,14 @@ class Rectified:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Returned:
-    """A photo with an edited view put back: the `picture`, and how many of its pixels `changed`."""
+    """A photo with an edited view put back: the `picture`, and how many of its pixels `changed`.
+
+    `notes` are sentences for the user.
+    """
 
     picture: Picture
     changed: int
+    notes: tuple[str, ...] = ()
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the photo: `Picture.save`."""

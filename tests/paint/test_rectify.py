@@ -1,5 +1,7 @@
 """Straightened views: where the lattice comes to lie, what is known, how sharp it is, and the way back."""
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -250,6 +252,26 @@ def test_a_jpegs_noise_is_no_edit_and_another_size_is_refused() -> None:
     assert found.back(Image(noisy.pixels, noisy.valid)).changed > 1000
     with pytest.raises(UsageError, match="but the view is"):
         found.back(blank())
+
+
+def test_a_view_made_with_other_options_of_the_same_size_gets_a_note_and_no_edit_does() -> None:
+    photo = scene()
+    grain = np.random.default_rng(0).normal(0, 0.03, photo.pixels.shape)  # as every photo has
+    photo = dataclasses.replace(photo, pixels=np.clip(photo.pixels + grain, 0, 1).astype(np.float32))
+    found = rectify(photo, loads(LATTICE), crop="same", upright=False)
+    painted = found.paint()
+    edited = painted.values.copy()
+    edited[100:200, 150:300] = (255, 0, 255)
+    for picture in (painted, Picture(edited, painted.alpha)):
+        assert not found.back(read_again(picture)).notes
+    jpeg = Source("JPEG")
+    for changes in ({"upright": True}, {"focal_mm": 30.0}):
+        other = rectify(photo, loads(LATTICE), crop="same", **{"upright": False, **changes}).paint()
+        assert other.size == painted.size
+        notes = found.back(read_again(other)).notes
+        assert len(notes) == 1 and "other options" in notes[0]
+    turned = read_again(rectify(photo, loads(LATTICE), crop="same", upright=True).paint())
+    assert found.back(Image(turned.pixels, turned.valid, source=jpeg)).notes
 
 
 def test_holes_of_the_photo_are_transparent_in_the_view() -> None:
