@@ -49,11 +49,9 @@ _REACH = 0.25
 _ROUNDS = 6
 _LEAST_AGREEMENT = 0.3
 """Cells that agree less with the mean cell are no objects: something stands before them."""
-_NOISE_PX = 0.25
-_NOISE_STEPS = 0.02
+_NOISE_PX, _NOISE_STEPS = 0.25, 0.02
 _ROBUST = 3.0
-_WINDOW = 3
-_LEAST_IN_WINDOW = 6
+_WINDOW, _LEAST_IN_WINDOW = 3, 6
 _FEWEST = 9
 """Fewer objects than this say nothing of local periods."""
 _K1 = np.linspace(-0.3, 0.3, 61)
