@@ -7,19 +7,25 @@ from collections.abc import Callable
 from p3i.errors import SketchError
 from p3i.grammar.ast import Header
 from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.leaves import with_leaves
 from p3i.grammar.printer import format_program
+from p3i.grammar.sketch import Sketch
+from p3i.interp.camera import Camera
+from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
 from p3i.search.enumerate import sketches_by_length
 from p3i.search.fill import whole_program_sketch
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
 from p3i.search.session import Answer, Session
-from p3i.search.sketched import WALKED, find_by_sketch, most_drawn
+from p3i.search.sketched import WALKED, find_by_sketch, most_drawn, structure_of
 from p3i.search.sketches import FAMILIES
 from p3i.size import Size
 
 # A sketch that draws fewer objects than this fixes neither camera nor pattern.
 _FEWEST_OBJECTS = 4
+# So many answers of a family are taken as starts for a sketch.
+_MOST_KNOWN = 2
 # Canvases whose sides differ in proportion by more than this are not the same picture.
 _SAME_SHAPE = 0.02
 
@@ -28,12 +34,32 @@ def asked_for(config: SearchConfig) -> Callable[[Session], list[Answer]] | None:
     """How to find the programs that the options ask for; None where the families are to be asked."""
     if config.recipe == "paper":
         return find_by_paper
-    sketch = config.sketch
     if config.start is not None:
-        sketch = whole_program_sketch(config.start)
+        start = whole_program_sketch(config.start)
+        return lambda session: find_by_sketch(session, start)
+    sketch = config.sketch
     if sketch is None:
         return None
-    return lambda session: find_by_sketch(session, sketch)
+    return lambda session: find_by_sketch(session, sketch, known=_by_family(session, sketch))
+
+
+def _by_family(session: Session, sketch: Sketch) -> list[Answer]:
+    """What the family that draws what the sketch draws finds, the best few, under the assumed focal."""
+    structure, loops = structure_of(sketch.template), nest(sketch.template)
+    if structure == "lattice" and (loops.for_i is None or loops.for_j is None):
+        return []  # a row is no lattice, and no family's
+    found = next((family.find for family in FAMILIES if family.structure == structure), None)
+    answers = [] if found is None else found(session)[:_MOST_KNOWN]
+    return [_refocused(answer, session.evidence.focal_mm) for answer in answers]
+
+
+def _refocused(answer: Answer, focal_mm: float) -> Answer:
+    """The answer with the camera of this focal that sees the same vanishing line."""
+    if answer.focal_mm is None:
+        return answer
+    camera = Camera.of(answer.program, focal_mm=answer.focal_mm).refocused(focal_mm)
+    angles = {"camera.rx": camera.rx_deg, "camera.ry": camera.ry_deg}
+    return dataclasses.replace(answer, program=with_leaves(answer.program, angles), focal_mm=None)
 
 
 def why_not(config: SearchConfig) -> StopReason:

@@ -15,6 +15,7 @@ from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
 from p3i.search.patches import Frames, find_objects, frames, patch_contrast, spacing
 from p3i.search.register import robust_fit
+from p3i.search.score import score_of_curve
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
@@ -31,10 +32,6 @@ _MOST_ZOOM = 0.15
 _FEWEST = 3
 # A misfit of the objects' places beyond this one counts like it.
 _WORST = 3.0
-# What so many objects explain, chance explains too, ...
-_FEW = 3
-# ... and so much agreement is found on photos without a pattern.
-_CHANCE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,13 +155,8 @@ def follow(
 
 
 def curve_score(fit: CurveFit) -> float:
-    """The score, 0 to 1, of a program that was fitted: its quality, less what few objects get by chance.
-
-    On any photo some ring can be found that agrees a little; that much is taken off, so that one limit serves
-    all structures (docs/benchmarks.md says what it was calibrated on).
-    """
-    sure = fit.quality * (1 - _FEW / max(len(fit.contrast), _FEW))
-    return max(0.0, (sure - _CHANCE) / (1 - _CHANCE))
+    """The score, 0 to 1, of a program that was fitted: `score_of_curve` of its quality."""
+    return score_of_curve(fit.quality, len(fit.contrast))
 
 
 def _whitening(matrix: Tensor, where: Frames) -> Tensor:

@@ -22,8 +22,11 @@ from p3i.vision.warp import in_frame, sample, sample_valid
 MOST_JUDGED = 600
 """More cells than this are not needed to judge a program."""
 _ROUNDS = 4
-# What so many cells explain, chance explains too.
+# What so many cells explain, chance explains too; on a curve fewer, as there are fewer curves to choose from.
 _FEW = 6
+_FEW_ON_CURVE = 3
+# So much agreement is found on some curve of every photo.
+_CHANCE_OF_CURVE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +77,8 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
     if len(steps) < len(HALF_STEPS):  # one loop sweeps no cells: patches about the draws are compared
         side = spacing(pattern, pattern.theta)
         mm = evidence.focal_mm
-        return score_of(
-            patch_contrast(evidence, pattern, pattern.theta, index, side=side, focal_mm=mm).contrast
-        )
+        found = patch_contrast(evidence, pattern, pattern.theta, index, side=side, focal_mm=mm)
+        return score_of_curve(_mean(found.contrast), len(index))
     side = _cell_px(evidence, pattern, index)
     return max(
         score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=steps))
@@ -113,9 +115,21 @@ def score_of(contrast: torch.Tensor) -> float:
     A cell that looks more like its half-way neighbour speaks against the pattern, but by half only, since
     something may lie on it. Few cells agree by chance, and eight numbers are fitted to them.
     """
-    count = max(len(contrast), _FEW)
-    mean = float((contrast.clamp(min=0) + 0.5 * contrast.clamp(max=0)).mean())
-    return max(0.0, mean * (1 - _FEW / count))
+    return max(0.0, _mean(contrast) * (1 - _FEW / max(len(contrast), _FEW)))
+
+
+def score_of_curve(quality: float, count: int) -> float:
+    """The normalised score, 0 to 1, of `count` objects on a curve; `quality` is at most their mean contrast.
+
+    On any photo some ring can be found that agrees a little; that much is taken off, so that one limit serves
+    all structures (docs/benchmarks.md says what it was calibrated on).
+    """
+    sure = quality * (1 - _FEW_ON_CURVE / max(count, _FEW_ON_CURVE))
+    return max(0.0, (sure - _CHANCE_OF_CURVE) / (1 - _CHANCE_OF_CURVE))
+
+
+def _mean(contrast: torch.Tensor) -> float:
+    return float((contrast.clamp(min=0) + 0.5 * contrast.clamp(max=0)).mean())
 
 
 def _equation2(

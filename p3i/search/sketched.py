@@ -5,6 +5,7 @@ fitted to where their objects really lie (curves.py), the extents are read off w
 numbers that a person bounded stay within their bounds all the way.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -15,6 +16,7 @@ from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.compile import compile
 from p3i.interp.unroll import nest
+from p3i.search.borrowed import written_in
 from p3i.search.centring import centred, standing_out
 from p3i.search.climb import Found, distinct, search_grid
 from p3i.search.coarse import PointMaps, kept_within
@@ -74,21 +76,27 @@ class _Fit:
     worth: float
 
 
-def find_by_sketch(session: Session, sketch: Sketch, *, effort: Effort = BY_HAND) -> list[Answer]:
-    """Programs that fill the sketch, the best first; empty where no filling has objects in the photo."""
+def find_by_sketch(
+    session: Session, sketch: Sketch, *, known: Sequence[Answer] = (), effort: Effort = BY_HAND
+) -> list[Answer]:
+    """Programs that fill the sketch, the best first; empty where no filling has objects in the photo.
+
+    Fits begin at the answers that are `known`, and go on to the grid where none of these is sure enough.
+    """
     size = session.evidence.image.size
     canvas = (size.width / size.unit_px, size.height / size.unit_px)
     unknowns = unknowns_of(sketch, longer_units=canvas)
     every = list(fillings(sketch, unknowns, most_indices=_MOST_INDICES, most_settings=_MOST_SETTINGS))
     if not every:
         return []
-    maps = PointMaps.of(session.evidence)
-    answers: list[Answer] = []
+    starts = [start for answer in known if (start := written_in(every, answer.program)) is not None]
+    answers = _answers(session, starts, done=0.0, share=0.0)
     for turn in range(effort.rounds):
-        answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
         enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
         if enough or not session.go_on():
             break
+        maps = PointMaps.of(session.evidence)
+        answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
     return _different(sorted(answers, key=lambda answer: -answer.score))
 
 
@@ -107,11 +115,16 @@ def _searched(
     found = distinct(maps, sorted(found, key=lambda one: -one.score))[: effort.fits]
     for one in found:
         session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
+    return _answers(session, found, done=done + share * 0.7, share=share * 0.3)
+
+
+def _answers(session: Session, found: Sequence[Found], *, done: float, share: float) -> list[Answer]:
+    """What was found, fitted to its objects; `done` and `share` are parts of the whole search."""
     answers: list[Answer] = []
     for place, one in enumerate(found):
         if answers and not session.go_on():
             break
-        session.tell("fitting to the objects", done + share * (0.7 + 0.3 * place / len(found)))
+        session.tell("fitting to the objects", done + share * place / len(found))
         fit = _fitted(session, one)
         if fit is not None:
             answers.append(_answer(session, fit))

@@ -1,15 +1,18 @@
 """What is searched when a person asks for something else than the families."""
 
 import pytest
+from truth import pose_error_deg, small_scene
 
 import p3i
 from p3i.evaluation.program_scenes import program_scene
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.search import asked
+from p3i.interp.camera import Camera
+from p3i.search import asked, sketched
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.result import NEEDED, StopReason
-from p3i.search.session import Session
+from p3i.search.session import Answer, Session
+from p3i.search.synthesize import synthesize
 from p3i.size import Size
 
 ROW = "SetCameraPose(rx=-30, ry=5)\nfor j in range(0, 8):\n    Draw(x=9*j - 30, y=2*j)\n"
@@ -43,6 +46,33 @@ def test_the_focal_in_the_header_of_a_sketch_counts() -> None:
     assert p3i.synth(image, sketch=sketch(text)).focal_mm == 50
     assert p3i.synth(image, sketch=sketch(text)).focal_source == "header"
     assert p3i.synth(image, sketch=sketch(text), focal_mm=28).focal_mm == 28
+
+
+def test_a_sketch_of_what_a_family_draws_starts_from_its_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight holes without bounds: no grid finds them, and none is looked through here."""
+    monkeypatch.setattr(sketched, "_searched", lambda *args, **options: [])
+    scene = small_scene(14)
+    free = sketch(
+        "SetCameraPose(rx=??, ry=??)\nfor i in range(0, ??):\n    for j in range(0, ??):\n"
+        "        Draw(x=??*i + ??*j + ??, y=??*i + ??*j + ??)\n"
+    )
+    result = synthesize(scene.image(), SearchConfig(sketch=free))
+    assert result.program is not None and result.structure == "lattice"
+    assert pose_error_deg(result.program, scene.program) < 1.5
+    row = sketch("SetCameraPose(rx=??, ry=??)\nfor j in range(0, ??):\n    Draw(x=??*j + ??, y=??*j + ??)\n")
+    assert synthesize(scene.image(), SearchConfig(sketch=row)).program is None
+
+
+def test_an_answer_with_a_focal_of_its_own_keeps_its_vanishing_line_under_the_assumed_one() -> None:
+    ring = p3i.loads(
+        "SetCameraPose(rx=30, ry=10)\nfor j in range(0, 8):\n    Draw(x=9*Cos(45*j), y=9*Sin(45*j))\n"
+    )
+    one = asked._refocused(Answer(ring, "circular", 0.5, 0.5, focal_mm=60.0), 35.0)
+    size = Size(400, 300)
+    own = Camera.of(ring, focal_mm=60.0).horizon(size)
+    now = Camera.of(one.program, focal_mm=35.0).horizon(size)
+    assert one.focal_mm is None and own is not None and now == pytest.approx(own)
+    assert asked._refocused(one, 50.0) is one
 
 
 def test_the_walk_tries_the_shortest_sketches_that_no_family_covers(monkeypatch: pytest.MonkeyPatch) -> None:

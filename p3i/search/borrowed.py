@@ -1,0 +1,50 @@
+"""A family's answers as starts for a sketch: the same pattern, as far as the sketch can say it.
+
+A grid over all holes of a lattice has a point for one in a million; the lattice family looks at the picture
+instead. Where a sketch draws what a family draws, that family's answer, written in the sketch's numbers, is
+the place to begin, whatever the sketch fixes, ties together or bounds.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from p3i.grammar.ast import Program
+from p3i.interp.compile import compile
+from p3i.interp.pattern import Pattern
+from p3i.search.climb import Found
+from p3i.search.coarse import kept_within
+from p3i.search.fill import Filling
+from p3i.search.patches import spacing
+
+# A start that draws its objects further off than this share of their spacing is none.
+_MOST_OFF = 1.0
+
+
+def written_in(every: Sequence[Filling], program: Program) -> Found | None:
+    """The filling, of a sketch's, that draws a program's objects most nearly; None where none comes near.
+
+    Its score is -1 times how far off the objects lie, in spacings.
+    """
+    pattern = compile(program)
+    found: list[Found] = []
+    for filling in every:
+        theta = _in_order(pattern, filling.pattern)
+        if theta is None:
+            continue
+        z = kept_within(filling, filling.z_of(theta))
+        drawn = filling.pattern.points_at(pattern.index.double(), filling.theta(z))
+        off = (drawn - pattern.centers()).norm(dim=1).median() / spacing(pattern, pattern.theta)
+        setting = (filling.masks.sum(1) - len(pattern.index)).abs().argmin()
+        found.append(Found(filling, z, int(setting), -float(off)))
+    best = max(found, key=lambda one: one.score, default=None)
+    return best if best is not None and best.score > -_MOST_OFF else None
+
+
+def _in_order(pattern: Pattern, of: Pattern) -> Tensor | None:
+    """The numbers of a pattern in the order of another's; None where the two have other forms."""
+    values = dict(zip(pattern.paths, pattern.theta.tolist(), strict=True))
+    if set(values) != set(of.paths):
+        return None
+    return torch.tensor([values[path] for path in of.paths], dtype=torch.float64)
