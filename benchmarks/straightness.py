@@ -2,7 +2,6 @@
 
 python benchmarks/straightness.py PHOTOS                            # an annotated set, as `p3i eval` takes it
 python benchmarks/straightness.py PHOTOS --programs answers.jsonl   # the JSON lines of `p3i synth`, no search
-python benchmarks/straightness.py PHOTOS --out rows.jsonl
 
 Each lattice photo is straightened as `p3i rectify` does. In the view every cell is registered to the mean
 of all, finer than a pixel, so each object has a measured place, in steps of the lattice. Then, per axis and
