@@ -51,13 +51,7 @@ _GROUP = (
 @search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@click.option(
-    "--seed",
-    type=int,
-    default=default("seed"),
-    show_default=True,
-    help=sentence("seed"),
-)
+@options.field(SearchConfig, "seed", type=int)
 @search_options.device
 @search_options.threads
 @options.quiet

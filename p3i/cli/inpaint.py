@@ -28,43 +28,13 @@ sentence, default = told(InpaintOptions)
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option
 @options.force
-@click.option(
-    "--method",
-    type=click.Choice(METHODS),
-    default=default("method"),
-    show_default=True,
-    help=sentence("method"),
-)
-@click.option(
-    "--steps",
-    type=int,
-    metavar="N",
-    default=default("steps"),
-    show_default=True,
-    help=sentence("steps"),
-)
+@options.field(InpaintOptions, "method", type=click.Choice(METHODS))
+@options.field(InpaintOptions, "steps", type=int, metavar="N")
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
 @click.option("--checkpoint", type=click.Path(), metavar="FILE", help=sentence("checkpoint"))
-@click.option(
-    "--seed",
-    type=int,
-    default=default("seed"),
-    show_default=True,
-    help=sentence("seed"),
-)
-@click.option(
-    "--device",
-    default=default("device"),
-    show_default=True,
-    help=sentence("device"),
-)
-@click.option(
-    "--threads",
-    type=int,
-    default=default("threads"),
-    show_default=True,
-    help=sentence("threads"),
-)
+@options.field(InpaintOptions, "seed", type=int)
+@options.field(InpaintOptions, "device")
+@options.field(InpaintOptions, "threads", type=int)
 @options.focal(InpaintOptions)
 @options.quiet
 @options.verbose

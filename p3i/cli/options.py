@@ -43,6 +43,16 @@ def output(sentence: str) -> Decorator:
     )
 
 
+def field(record: type, name: str, *flags: str, **rest: Any) -> Decorator:
+    """An option in the words of a record's field `name`, with the field's default, which `--help` shows.
+
+    `flags` are the option's names where it is not called like the field, `rest` what click.option takes.
+    """
+    sentence, default = told(record)
+    flags = flags or (f"--{name.replace('_', '-')}",)
+    return click.option(*flags, default=default(name), show_default=True, help=sentence(name), **rest)
+
+
 def focal(record: type) -> Decorator:
     """`--focal MM`, in the words of a record's field `focal_mm`."""
     sentence, _ = told(record)
@@ -51,15 +61,7 @@ def focal(record: type) -> Decorator:
 
 def max_px(record: type) -> Decorator:
     """`--max-px N`, in the words of a record's field `max_px`."""
-    sentence, default = told(record)
-    return click.option(
-        "--max-px",
-        type=int,
-        metavar="N",
-        default=default("max_px"),
-        show_default=True,
-        help=sentence("max_px"),
-    )
+    return field(record, "max_px", type=int, metavar="N")
 
 
 def photo_and_program(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -60,13 +60,7 @@ _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
     help=sentence("outside"),
 )
 @click.option("--clip", is_flag=True, default=default("clip"), help=sentence("clip"))
-@click.option(
-    "--label",
-    metavar="WORD",
-    default=default("label"),
-    show_default=True,
-    help=sentence("label"),
-)
+@options.field(PointsOptions, "label", metavar="WORD")
 @click.option(
     "--expect",
     type=SizeType(),

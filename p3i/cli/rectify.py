@@ -21,22 +21,11 @@ sentence, default = told(RectifyOptions)
 @kind_option
 @json_option
 @options.force
-@click.option(
-    "--crop",
-    type=click.Choice(CROPS),
-    default=default("crop"),
-    show_default=True,
-    help=sentence("crop"),
-)
+@options.field(RectifyOptions, "crop", type=click.Choice(CROPS))
 @click.option("--scale", type=float, metavar="S", help=sentence("scale"))
 @options.max_px(RectifyOptions)
 @click.option("--cell", metavar="WxHmm", help=sentence("cell"))
-@click.option(
-    "--upright/--as-seen",
-    default=default("upright"),
-    show_default=True,
-    help=sentence("upright"),
-)
+@options.field(RectifyOptions, "upright", "--upright/--as-seen")
 @options.focal(RectifyOptions)
 @click.option(
     "--back",

@@ -29,13 +29,7 @@ sentence, default = told(ShowOptions)
     help="The kind of picture. [default: by the name of -o, else png]",
 )
 @options.force
-@click.option(
-    "--labels",
-    type=click.Choice(LABELS),
-    default=default("labels"),
-    show_default=True,
-    help=sentence("labels"),
-)
+@options.field(ShowOptions, "labels", type=click.Choice(LABELS))
 @click.option("--points/--no-points", default=default("points"), help=sentence("points"))
 @click.option("--cells/--no-cells", default=default("cells"), help=sentence("cells"))
 @click.option("--horizon/--no-horizon", default=default("horizon"), help=sentence("horizon"))
@@ -45,14 +39,7 @@ sentence, default = told(ShowOptions)
     default=default("presence"),
     help=sentence("presence"),
 )
-@click.option(
-    "--longer",
-    type=int,
-    metavar="N",
-    default=default("longer"),
-    show_default=True,
-    help=sentence("longer"),
-)
+@options.field(ShowOptions, "longer", type=int, metavar="N")
 @options.focal(ShowOptions)
 @options.quiet
 @options.error_format

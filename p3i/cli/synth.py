@@ -56,29 +56,11 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 )
 @options.output("Where to write; - is stdout. Several photos need a folder, or --format jsonl.")
 @options.force
-@click.option(
-    "--structure",
-    metavar="|".join(STRUCTURES),
-    default=default("structure"),
-    show_default=True,
-    help=sentence("structure"),
-)
-@click.option(
-    "--extent",
-    type=click.Choice(EXTENTS),
-    default=default("extent"),
-    show_default=True,
-    help=sentence("extent"),
-)
+@options.field(SearchConfig, "structure", metavar="|".join(STRUCTURES))
+@options.field(SearchConfig, "extent", type=click.Choice(EXTENTS))
 @click.option("--sketch", type=click.Path(), metavar="FILE", help=sentence("sketch"))
 @click.option("--start", type=click.Path(), metavar="FILE", help=sentence("start"))
-@click.option(
-    "--recipe",
-    type=click.Choice(RECIPES),
-    default=default("recipe"),
-    show_default=True,
-    help=sentence("recipe"),
-)
+@options.field(SearchConfig, "recipe", type=click.Choice(RECIPES))
 @click.option("--exhaustive", "exhaustive_s", type=float, metavar="SECONDS", help=sentence("exhaustive_s"))
 @click.option("--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown.")
 @click.option(
@@ -92,21 +74,8 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 @search_options.weights
 @click.option("--strict", is_flag=True, help=sentence("strict"))
 @click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@click.option(
-    "--top",
-    type=int,
-    metavar="K",
-    default=default("top"),
-    show_default=True,
-    help=sentence("top"),
-)
-@click.option(
-    "--seed",
-    type=int,
-    default=default("seed"),
-    show_default=True,
-    help=sentence("seed"),
-)
+@options.field(SearchConfig, "top", type=int, metavar="K")
+@options.field(SearchConfig, "seed", type=int)
 @search_options.device
 @search_options.threads
 @click.option("--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height).")

@@ -39,23 +39,10 @@ class RepeatType(click.ParamType):
 @kind_option
 @json_option
 @options.force
-@click.option(
-    "--from",
-    "source",
-    type=click.Choice(SOURCES),
-    default=default("source"),
-    show_default=True,
-    help=sentence("source"),
-)
+@options.field(TileOptions, "source", "--from", "source", type=click.Choice(SOURCES))
 @click.option("--size", type=SizeType(), metavar="WxH", help=sentence("size"))
 @click.option("--repeat", type=RepeatType(), metavar="NxM", default=(1, 1), help=sentence("repeat"))
-@click.option(
-    "--even-light/--keep-light",
-    "light",
-    default=default("light"),
-    show_default=True,
-    help=sentence("light"),
-)
+@options.field(TileOptions, "light", "--even-light/--keep-light", "light")
 @options.focal(TileOptions)
 @options.max_px(TileOptions)
 @options.quiet
