@@ -26,6 +26,7 @@ from skimage.metrics import structural_similarity
 
 import p3i
 from p3i.evaluation.measures import measure
+from p3i.evaluation.score_set import read_results
 from p3i.evaluation.truth import read_truth
 from p3i.paint.inpaint import inpaint
 from p3i.paint.inpaint_options import InpaintOptions
@@ -161,8 +162,8 @@ def main() -> None:
     ways = fills(asked.methods, steps=asked.steps)
     known: dict[str, p3i.Program] = {}
     if asked.programs:
-        lines = map(json.loads, asked.programs.read_text(encoding="utf-8").splitlines())
-        known = {Path(line["image"]).name: p3i.loads(line["program"]) for line in lines if line["program"]}
+        told = read_results(asked.programs)
+        known = {name: p3i.loads(line["program"]) for name, line in told.items() if line["program"]}
     rows: list[Row] = []
     with open(asked.out or os.devnull, "w", encoding="utf-8") as out:
         truths = [truth for truth in read_truth(asked.photos) if truth.structure == "lattice"]

@@ -30,6 +30,7 @@ import torch
 from numpy.typing import NDArray
 
 import p3i
+from p3i.evaluation.score_set import read_results
 from p3i.evaluation.truth import read_truth
 from p3i.interp.lens import straight_from_photo
 from p3i.paint.placed import Placed
@@ -358,8 +359,8 @@ def main() -> None:
     cv2.setNumThreads(1)
     known: dict[str, p3i.Program] = {}
     if asked.programs:
-        lines = map(json.loads, asked.programs.read_text(encoding="utf-8").splitlines())
-        known = {Path(line["image"]).name: p3i.loads(line["program"]) for line in lines if line["program"]}
+        told = read_results(asked.programs)
+        known = {name: p3i.loads(line["program"]) for name, line in told.items() if line["program"]}
     rows: list[Row] = []
     heads = ["local", "jitter", "noise", "trend", "error", "bow", "| refit: local", "trend"]
     print(f"{'% of a period, u v':36s}", *(f"{head:>11s}" for head in heads), "  turn |   k1       trend")

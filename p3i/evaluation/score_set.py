@@ -87,7 +87,7 @@ def score_set(
     if not truths:
         raise UsageError(f"no photo of {folder} has {only!r} in its name")
     if results is not None:
-        answers = _read_results(results)
+        answers = read_results(results)
         rows = [_row(truth, answers.get(Path(truth.file).name)) for truth in truths]
         return SetScore(rows=tuple(rows), summary=summarise(rows))
     begun = time.perf_counter()
@@ -165,8 +165,11 @@ def _row(truth: Truth, record: Mapping[str, Any] | None) -> Row:
     )
 
 
-def _read_results(path: Path) -> dict[str, Mapping[str, Any]]:
-    """The records of a JSON Lines file by the photo's name; lines that are no record are passed over."""
+def read_results(path: Path) -> dict[str, Mapping[str, Any]]:
+    """The records of a JSON Lines file by the photo's name; lines that are no record are passed over.
+
+    Raises FileError for a file that cannot be read or holds no record.
+    """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -33,7 +33,7 @@ from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.stack import fill_by_stack
 from p3i.records import changed
 from p3i.size import Size
-from p3i.vision.fill import filled
+from p3i.vision.fill import fill_in
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
 
@@ -157,9 +157,7 @@ def extend(
         left_over = unlike
     bare |= left_over
     if bare.any():
-        # Channel by channel: at once it takes as much memory as all the rest.
-        for channel in np.split(pixels, 3, axis=2):
-            np.copyto(channel, filled(channel, (known | hole) & ~bare), where=bare[:, :, None])
+        fill_in(pixels, (known | hole) & ~bare, bare)
     pixels[inside] = np.where(lacking[:, :, None], pixels[inside], photo.pixels)
     smooth = float(bare.sum() / hole.sum())
     wider = _program(program, wide, more, sides, laid.size)

@@ -17,7 +17,7 @@ from p3i.paint.cells import nearest
 from p3i.paint.matching import carried, trusted
 from p3i.paint.placed import Placed
 from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, sources
-from p3i.vision.fill import filled
+from p3i.vision.fill import fill_in
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
 
@@ -66,9 +66,7 @@ def fill_by_stack(
         context[rows[seen], columns[seen]] = True
         before[rows[seen], columns[seen]] = True
     if bare.any():
-        # Channel by channel: at once it takes as much memory as all the rest.
-        for channel in np.split(result, 3, axis=2):
-            np.copyto(channel, filled(channel, context), where=bare[:, :, None])
+        fill_in(result, context, bare)
     return result, bare
 
 

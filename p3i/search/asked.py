@@ -54,7 +54,11 @@ def _by_family(session: Session, sketch: Sketch) -> list[Answer]:
 
 
 def _refocused(answer: Answer, focal_mm: float) -> Answer:
-    """The answer with the camera of this focal that sees the same vanishing line."""
+    """A ring's answer with the camera of this focal that sees the same vanishing line.
+
+    Its plane stays, as the affine change of `focal.refocused` would make an ellipse of the circle: its points
+    in the photo move a little, and the fit that starts here brings them back.
+    """
     if answer.focal_mm is None:
         return answer
     camera = Camera.of(answer.program, focal_mm=answer.focal_mm).refocused(focal_mm)

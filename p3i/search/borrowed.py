@@ -8,11 +8,10 @@ the place to begin, whatever the sketch fixes, ties together or bounds.
 from collections.abc import Sequence
 
 import torch
-from torch import Tensor
 
 from p3i.grammar.ast import Program
 from p3i.interp.compile import compile
-from p3i.interp.pattern import Pattern
+from p3i.interp.pattern import moving_leaves
 from p3i.search.climb import Found
 from p3i.search.coarse import kept_within
 from p3i.search.fill import Filling
@@ -27,12 +26,12 @@ def written_in(every: Sequence[Filling], program: Program) -> Found | None:
 
     Its score is -1 times how far off the objects lie, in spacings.
     """
-    pattern = compile(program)
+    pattern, values = compile(program), moving_leaves(program)
     found: list[Found] = []
     for filling in every:
-        theta = _in_order(pattern, filling.pattern)
-        if theta is None:
-            continue
+        if set(filling.pattern.paths) != set(values):
+            continue  # another form of pattern
+        theta = torch.tensor([values[path] for path in filling.pattern.paths], dtype=torch.float64)
         z = kept_within(filling, filling.z_of(theta))
         drawn = filling.pattern.points_at(pattern.index.double(), filling.theta(z))
         off = (drawn - pattern.centers()).norm(dim=1).median() / spacing(pattern, pattern.theta)
@@ -40,11 +39,3 @@ def written_in(every: Sequence[Filling], program: Program) -> Found | None:
         found.append(Found(filling, z, int(setting), -float(off)))
     best = max(found, key=lambda one: one.score, default=None)
     return best if best is not None and best.score > -_MOST_OFF else None
-
-
-def _in_order(pattern: Pattern, of: Pattern) -> Tensor | None:
-    """The numbers of a pattern in the order of another's; None where the two have other forms."""
-    values = dict(zip(pattern.paths, pattern.theta.tolist(), strict=True))
-    if set(values) != set(of.paths):
-        return None
-    return torch.tensor([values[path] for path in of.paths], dtype=torch.float64)

@@ -81,7 +81,8 @@ class SearchConfig:
     def __post_init__(self) -> None:
         _one_of("structure", self.structure, STRUCTURES)
         if self.recipe == "paper":  # one configuration, whole
-            if self.features == told(SearchConfig)[1]("features"):
+            _, default = told(SearchConfig)
+            if self.features == default("features"):
                 object.__setattr__(self, "features", "rgb" if self.weights is None else "alexnet")
             object.__setattr__(self, "extent", "image")
         parts = [part.strip() for part in self.features.split("+")]

@@ -15,7 +15,7 @@ from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
 from p3i.search.patches import Frames, find_objects, frames, patch_contrast, spacing
 from p3i.search.register import robust_fit
-from p3i.search.score import score_of_curve
+from p3i.search.score import mean_contrast, score_of_curve
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
@@ -57,10 +57,8 @@ class CurveFit:
 
     @property
     def mean(self) -> float:
-        """The mean contrast; objects that look more like half steps speak against it by half."""
-        if len(self.contrast) == 0:
-            return 0.0
-        return float((self.contrast.clamp(min=0) + 0.5 * self.contrast.clamp(max=0)).mean())
+        """The mean contrast: `mean_contrast`."""
+        return mean_contrast(self.contrast)
 
     @property
     def quality(self) -> float:

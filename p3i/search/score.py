@@ -78,7 +78,7 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
         side = spacing(pattern, pattern.theta)
         mm = evidence.focal_mm
         found = patch_contrast(evidence, pattern, pattern.theta, index, side=side, focal_mm=mm)
-        return score_of_curve(_mean(found.contrast), len(index))
+        return score_of_curve(mean_contrast(found.contrast), len(index))
     side = _cell_px(evidence, pattern, index)
     return max(
         score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=steps))
@@ -112,10 +112,9 @@ def judged_contrast(
 def score_of(contrast: torch.Tensor) -> float:
     """The normalised score, 0 to 1, of cells with this contrast [N].
 
-    A cell that looks more like its half-way neighbour speaks against the pattern, but by half only, since
-    something may lie on it. Few cells agree by chance, and eight numbers are fitted to them.
+    Few cells agree by chance, and eight numbers are fitted to them.
     """
-    return max(0.0, _mean(contrast) * (1 - _FEW / max(len(contrast), _FEW)))
+    return max(0.0, mean_contrast(contrast) * (1 - _FEW / max(len(contrast), _FEW)))
 
 
 def score_of_curve(quality: float, count: int) -> float:
@@ -128,7 +127,14 @@ def score_of_curve(quality: float, count: int) -> float:
     return max(0.0, (sure - _CHANCE_OF_CURVE) / (1 - _CHANCE_OF_CURVE))
 
 
-def _mean(contrast: torch.Tensor) -> float:
+def mean_contrast(contrast: torch.Tensor) -> float:
+    """The mean of the contrast [N] of cells or objects, 0 where there are none.
+
+    One that looks more like its half-way neighbour speaks against the pattern, but by half only, since
+    something may lie on it.
+    """
+    if len(contrast) == 0:
+        return 0.0
     return float((contrast.clamp(min=0) + 0.5 * contrast.clamp(max=0)).mean())
 
 

@@ -91,11 +91,12 @@ def find_by_sketch(
         return []
     starts = [start for answer in known if (start := written_in(every, answer.program)) is not None]
     answers = _answers(session, starts, done=0.0, share=0.0)
+    maps: PointMaps | None = None
     for turn in range(effort.rounds):
         enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
         if enough or not session.go_on():
             break
-        maps = PointMaps.of(session.evidence)
+        maps = maps or PointMaps.of(session.evidence)
         answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
     return _different(sorted(answers, key=lambda answer: -answer.score))
 

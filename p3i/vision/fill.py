@@ -17,6 +17,15 @@ def filled(array: np.ndarray, valid: np.ndarray) -> np.ndarray:
     return _push_pull(np.where(valid[:, :, None], array, np.float32(0)), weight)
 
 
+def fill_in(array: np.ndarray, valid: np.ndarray, where: np.ndarray) -> None:
+    """Write `filled` into the array's pixels `where` bool [H, W], in place.
+
+    Channel by channel: all at once takes as much memory as a large picture's other copies together.
+    """
+    for channel in np.split(array, array.shape[2], axis=2):
+        np.copyto(channel, filled(channel, valid), where=where[:, :, None])
+
+
 def eroded(valid: np.ndarray, radius: int) -> np.ndarray:
     """Where the whole square of `radius` pixels around is known; beyond the frame nothing is. Bool [H, W]."""
     if radius == 0:
