@@ -12,12 +12,13 @@ from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.enumerate import sketches_by_length
 from p3i.search.fill import whole_program_sketch
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 from p3i.search.sketched import WALKED, find_by_sketch, most_drawn, structure_of
 from p3i.search.sketches import FAMILIES
 from p3i.size import Size
