@@ -1,11 +1,8 @@
 """Pictures -> files: whole or not at all, and never over something that is there."""
 
-import errno
 import io
 import os
 import struct
-import sys
-import tempfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +12,7 @@ import numpy as np
 from PIL import Image as Pil
 
 from p3i.errors import FileError, UsageError
+from p3i.files import write_bytes as write_bytes
 from p3i.vision.decode import swap_red_blue
 from p3i.vision.exif import upright_exif
 
@@ -62,60 +60,6 @@ def write_image(
         pixels, kind=kind or Path(path).suffix, alpha=alpha, bits=bits, icc=icc, exif=exif, text=text, dpi=dpi
     )
     write_bytes(path, data, force=force)
-
-
-def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = False) -> None:
-    """Write bytes to a file or standard output (`-`): whole or not at all, over nothing unless `force`.
-
-    Raises FileError where the file exists (without `force`), is a folder, or cannot be written.
-    """
-    if os.fspath(path) == "-":
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-        return
-    target = Path(path)
-    try:
-        if target.is_dir():
-            raise FileError(f"{target} is a folder: name a file in it")
-        if target.exists() and not target.is_file():
-            # A device or a pipe (/dev/null): there is nothing to replace, and a rename would destroy it.
-            target.write_bytes(data)
-        else:
-            _write_beside_and_rename(target, data, force=force)
-    except FileNotFoundError:
-        raise FileError(f"there is no folder {target.parent} to write {target.name} into") from None
-    except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it
-        reason = error.strerror if isinstance(error, OSError) else None
-        raise FileError(f"{target} cannot be written: {reason or error}") from None
-
-
-def _write_beside_and_rename(target: Path, data: bytes, *, force: bool) -> None:
-    """Write a file in one step; FileError where it exists (without `force`), OSError as the system says."""
-    place = target.resolve()  # through a link, so that the link stays one
-    if not force and place.exists():
-        raise FileError(f"{target} exists already: name another file, or say --force")
-    handle, name = tempfile.mkstemp(prefix=f".{place.name[:40]}.", dir=place.parent)
-    beside = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        beside.chmod(_mode_of(place))
-        if force:
-            beside.replace(place)
-            return
-        # A link fails where a file has appeared since; a rename would replace it.
-        try:
-            os.link(beside, place)
-        except FileExistsError:
-            raise FileError(f"{target} exists already: name another file, or say --force") from None
-        except PermissionError:  # file systems without hard links say so
-            beside.replace(place)
-        except OSError as error:
-            if error.errno not in (errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
-                raise
-            beside.replace(place)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def encode(
@@ -263,12 +207,3 @@ def _quantized(values: np.ndarray, bits: int) -> np.ndarray:
     top = 2**bits - 1
     rounded = np.rint(np.clip(np.nan_to_num(values), 0, 1) * top)
     return rounded.astype(np.uint8 if bits == 8 else np.uint16)
-
-
-def _mode_of(place: Path) -> int:
-    """The permissions that the file has, or that a new one would get."""
-    if place.exists():
-        return place.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask

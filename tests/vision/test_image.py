@@ -291,11 +291,11 @@ def test_a_file_without_permission_is_refused_by_the_system(tmp_path):
 
 
 def test_a_refusal_of_the_system_is_told_as_missing_permission(tmp_path, monkeypatch):
-    def refuse(self):
-        raise PermissionError(13, "Permission denied", str(self))
+    def refuse(path):
+        raise PermissionError(13, "Permission denied", str(path))
 
     path = saved(tmp_path / "a.png", scene())
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(os, "stat", refuse)
     with pytest.raises(FileError, match="no permission to read"):
         read_image(path)
 
