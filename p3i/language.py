@@ -10,9 +10,10 @@ from p3i import files
 from p3i.errors import P3IError, UsageError
 from p3i.grammar import checker
 from p3i.grammar.ast import Program, Span
-from p3i.grammar.diagnostics import Diagnostic, ParseError, in_order, warning
+from p3i.grammar.diagnostics import Diagnostic, in_order, warning
 from p3i.grammar.layout import most_bytes, source_text
 from p3i.grammar.leaves import comments
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse, parse_with_holes
 from p3i.grammar.printer import Layout, format_program
 from p3i.grammar.sketch import Sketch, format_sketch, parse_sketch, sketch_of

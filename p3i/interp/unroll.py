@@ -12,9 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from p3i.grammar.ast import Affine, Coordinate, Draw, For, If, Polar, Program, Span
-from p3i.grammar.diagnostics import ParseError, error
+from p3i.grammar.diagnostics import error
 from p3i.grammar.leaves import statements
 from p3i.grammar.limits import DRAWS
+from p3i.grammar.parse_error import ParseError
 
 SLACK = 1e-9
 """What rounding may cost a bound or a guard: 0.07 * 100 is 7.000000000000001 and must count as 7."""

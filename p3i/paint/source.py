@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 from p3i.errors import FileError
 from p3i.files import read_bytes
 from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.layout import source_text
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse
 from p3i.paint.svg import PROGRAM_TAG
 from p3i.vision.write import read_png_text

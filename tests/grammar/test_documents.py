@@ -7,7 +7,7 @@ import pytest
 
 import p3i
 from p3i.grammar import limits
-from p3i.grammar.diagnostics import CODES, has_errors
+from p3i.grammar.diagnostics import CODES, Diagnostic
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 LANGUAGE = (DOCS / "language.md").read_text(encoding="utf-8")
@@ -15,6 +15,10 @@ ERRORS = (DOCS / "errors.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```p3p\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SECTIONS = dict(re.findall(r"^### (P\d{3}): (.*?)(?=^##|\Z)", ERRORS, re.MULTILINE | re.DOTALL))
 EXAMPLES = [(code, example) for code, text in SECTIONS.items() for example in BLOCK.findall(text)]
+
+
+def has_errors(found: tuple[Diagnostic, ...]) -> bool:
+    return "error" in {one.severity for one in found}
 
 
 @pytest.mark.parametrize("example", BLOCK.findall(LANGUAGE))

@@ -13,12 +13,14 @@ from lark import Lark
 from p3i import language
 from p3i.grammar import reader
 from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import CODES, ParseError
+from p3i.grammar.departures import departures
+from p3i.grammar.diagnostics import CODES
 from p3i.grammar.leaves import comments, leaves, with_leaves
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch, format_sketch, parse_sketch
-from p3i.grammar.strict import departures, read_strictly
+from p3i.grammar.strict import read_strictly
 
 
 def parsed(draw: str, *, loops: int) -> Program:
@@ -141,7 +143,7 @@ def test_strict_and_superset_agree_on_every_string_of_table_1(text: str) -> None
 LAYOUT = {"_NL": st.just("\n"), "_INDENT": st.just("    "), "_DEDENT": st.just("")}
 
 
-@given(from_lark(reader.build_superset(reader.grammar_text("p3p.lark")), start="program", explicit=LAYOUT))
+@given(from_lark(reader.build_superset(), start="program", explicit=LAYOUT))
 @settings(lenient, max_examples=25)  # such strings take long to draw
 def test_parse_is_total_on_strings_of_the_superset(text: str) -> None:
     outcome = parse(text)
