@@ -15,6 +15,7 @@ from p3i.errors import FileError, UsageError
 from p3i.files import write_bytes as write_bytes
 from p3i.vision.decode import swap_red_blue
 from p3i.vision.exif import upright_exif
+from p3i.vision.tiff import encode_tiff_16
 
 # Suffix -> Pillow's name of the format.
 _FORMATS = {
@@ -93,7 +94,7 @@ def encode(
     if name == "PNG":
         return _png(array, icc=icc, exif=exif, text=text or {}, dpi=dpi)
     if bits == 16:
-        return _tiff_16(array, icc=icc, dpi=dpi)
+        return encode_tiff_16(array, icc=icc, exif=exif, dpi=dpi)
     picture = Pil.fromarray(array)
     options: dict[str, object] = {"quality": _JPEG_QUALITY} if name in ("JPEG", "WEBP") else {}
     if name == "TIFF":
@@ -150,45 +151,6 @@ def _png(
 
 def _chunk(kind: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-
-def _tiff_16(array: np.ndarray, *, icc: bytes | None, dpi: float | None) -> bytes:
-    """A plain one-strip TIFF of uint16 [H, W, 3 or 4]: Pillow and OpenCV write none with a profile."""
-    height, width, channels = array.shape
-    strip = np.ascontiguousarray(array.astype("<u2")).tobytes()
-    short, long, rational, undefined = 3, 4, 5, 7
-    tags: list[tuple[int, int, int, bytes]] = [
-        (256, long, 1, struct.pack("<I", width)),
-        (257, long, 1, struct.pack("<I", height)),
-        (258, short, channels, struct.pack(f"<{channels}H", *[16] * channels)),
-        (259, short, 1, struct.pack("<H", 1)),  # not compressed
-        (262, short, 1, struct.pack("<H", 2)),  # RGB
-        (273, long, 1, struct.pack("<I", 8)),  # the strip follows the header
-        (277, short, 1, struct.pack("<H", channels)),
-        (278, long, 1, struct.pack("<I", height)),
-        (279, long, 1, struct.pack("<I", len(strip))),
-    ]
-    if dpi:
-        per_inch = struct.pack("<II", round(dpi * 1000), 1000)
-        tags += [(282, rational, 1, per_inch), (283, rational, 1, per_inch)]
-        tags.append((296, short, 1, struct.pack("<H", 2)))  # inches
-    if channels == 4:
-        tags.append((338, short, 1, struct.pack("<H", 2)))  # the fourth channel is plain alpha
-    if icc:
-        tags.append((34675, undefined, len(icc), icc))
-    directory_at = 8 + len(strip) + len(strip) % 2
-    overflow_at = directory_at + 2 + 12 * len(tags) + 4
-    entries, overflow = b"", b""
-    for tag, kind, count, value in tags:
-        if len(value) > 4:
-            place = struct.pack("<I", overflow_at + len(overflow))
-            overflow += value + b"\0" * (len(value) % 2)
-        else:
-            place = value.ljust(4, b"\0")
-        entries += struct.pack("<HHI", tag, kind, count) + place
-    head = b"II*\0" + struct.pack("<I", directory_at)
-    directory = struct.pack("<H", len(tags)) + entries + struct.pack("<I", 0)
-    return head + strip + b"\0" * (len(strip) % 2) + directory + overflow
 
 
 def _opencv_bytes(suffix: str, array: np.ndarray) -> bytes:

@@ -51,6 +51,63 @@ def test_16_bits_alpha_and_profile_survive(tmp_path, pixels, suffix, with_alpha)
         picture.load()  # another reader takes it too
 
 
+def camera_block() -> Pil.Exif:
+    exif = Pil.Exif()
+    exif[0x0112] = 6
+    exif[0x010F] = "Camera works"
+    exif[0x0102] = (8, 8, 8)  # of the old file: it contradicts the new one
+    exif.get_ifd(0x8769)[0x920A] = 28.5
+    exif.get_ifd(0x8769)[0xA405] = 52
+    exif.get_ifd(0x8825)[0x001D] = "2024:05:06"
+    return exif
+
+
+@pytest.mark.parametrize("odd", [0, 1])
+def test_a_deep_tiff_keeps_what_the_camera_wrote(tmp_path, pixels, odd):
+    path = tmp_path / "a.tif"
+    write_image(path, pixels[:, odd:], bits=16, exif=camera_block().tobytes(), icc=b"1234567"[odd:], dpi=300)
+    again = read_image(path)
+    assert again.source.bits == 16
+    np.testing.assert_allclose(again.pixels, pixels[:, odd:], atol=1e-5)
+    # 52 mm by the diagonal of 36 x 24, told for the diagonal of this picture
+    width, height = again.size.width, again.size.height
+    assert again.focal_mm == pytest.approx(
+        52 * np.hypot(width, height) / 43.27 * 36 / max(width, height), rel=1e-3
+    )
+    with Pil.open(path) as picture:
+        assert picture.info["icc_profile"] == b"1234567"[odd:]
+        assert picture.info["dpi"] == (300, 300)
+        found = picture.getexif()
+        assert found[0x010F] == "Camera works"
+        assert found.get(0x0112, 1) == 1
+        assert found.get_ifd(0x8769)[0x920A] == 28.5
+        assert found.get_ifd(0x8825)[0x001D] == "2024:05:06"
+
+
+def test_a_deep_tiff_is_deflated_as_other_readers_see_it(tmp_path):
+    smooth = np.linspace(0, 1, 64 * 64 * 4, dtype=np.float32).reshape(64, 64, 4)
+    path = tmp_path / "a.tif"
+    write_image(path, smooth[:, :, :3], alpha=smooth[:, :, 3], bits=16, exif=camera_block().tobytes())
+    assert path.stat().st_size < 0.5 * smooth.size * 2
+    tifffile = pytest.importorskip("tifffile")
+    with tifffile.TiffFile(path) as file:
+        (page,) = file.pages
+        assert page.compression.name == "ADOBE_DEFLATE"
+        assert [sample.name for sample in page.extrasamples] == ["UNASSALPHA"]
+        assert list(page.tags.keys()) == sorted(page.tags.keys())
+        np.testing.assert_array_equal(page.asarray(), np.rint(smooth * 65535))
+
+
+def test_a_deep_tiff_needs_no_extra_for_its_pixels(tmp_path, pixels, monkeypatch):
+    monkeypatch.setattr("p3i.vision.tiff.has_tifffile", lambda: False)
+    alpha = np.linspace(0, 1, 12 * 17, dtype=np.float32).reshape(12, 17)
+    write_image(tmp_path / "a.tif", pixels, alpha=alpha, bits=16, icc=b"123", exif=camera_block().tobytes())
+    again = read_image(tmp_path / "a.tif")
+    np.testing.assert_allclose(again.pixels, pixels, atol=1e-5)
+    np.testing.assert_allclose(again.source.alpha, alpha, atol=1e-5)
+    assert again.source.bits == 16
+
+
 def test_exif_is_kept_and_says_upright(tmp_path, pixels):
     exif = Pil.Exif()
     exif[0x0112] = 6
