@@ -65,6 +65,11 @@ def gather(words: Iterable[str], *, suffixes: Collection[str]) -> list[Path]:
     return list(found)
 
 
+def as_text(name: str) -> str:
+    """A file's name as text that can be encoded: bytes of it that are not UTF-8 become U+FFFD."""
+    return os.fsencode(name).decode("utf-8", errors="replace")
+
+
 def names_folder(text: str) -> bool:
     """Whether the output `text` means a folder: one that exists, or a name that ends with a slash.
 

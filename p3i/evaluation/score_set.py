@@ -4,6 +4,7 @@ import concurrent.futures
 import dataclasses
 import json
 import multiprocessing
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -201,7 +202,7 @@ def _answers(
 def _photo(folder: Path, file: str) -> Path:
     """A photo's file: as the annotation names it, or in images/."""
     direct = folder / file
-    return direct if direct.is_file() else folder / "images" / Path(file).name
+    return direct if os.path.isfile(direct) else folder / "images" / Path(file).name
 
 
 def _answer(photo: Path, config: SearchConfig) -> tuple[dict[str, Any], float, float]:

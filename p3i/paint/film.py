@@ -5,6 +5,7 @@ Whatever the step weighed (a lattice, a ring, a filled sketch) is drawn by the s
 
 import io
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,7 @@ def _chosen(searches: tuple[Search, ...], image: str | None, trace: Path) -> Sea
 def _photo(search: Search, image: str | None, beside: Path) -> tuple[np.ndarray | None, str]:
     """The photo as uint8 [H, W, 3], or None with a remark."""
     places = [Path(image)] if image else [Path(search.image), beside / search.image] if search.image else []
-    place = next((one for one in places if one.is_file()), None)
+    place = next((one for one in places if os.path.isfile(one)), None)
     if place is None and image:
         place = Path(image)  # whose reader says what is wrong
     if place is None:
