@@ -87,12 +87,11 @@ def same_place(one: Name, other: Name) -> bool:
     return False
 
 
-def read_bytes(path: Name, *, most: int = MOST_BYTES, cut: bool = False, pipes: bool = True) -> bytes:
+def read_bytes(path: Name, *, most: int = MOST_BYTES, cut: bool = False) -> bytes:
     """The bytes of a file or a pipe, or of standard input for `-`.
 
-    More than `most` bytes are refused, or left unread with `cut`. With `pipes` False nothing but a file is
-    opened: a pipe that nobody writes to would be waited for. Raises FileError with the reason where there is
-    nothing to read, UsageError for an empty name.
+    It is opened once, so that a pipe will do. More than `most` bytes are refused, or left unread with `cut`.
+    Raises FileError with the reason where there is nothing to read, UsageError for an empty name.
     """
     if os.fspath(path) == "-":
         return _up_to(_standard_input(), most, name="standard input", cut=cut)
@@ -102,8 +101,6 @@ def read_bytes(path: Name, *, most: int = MOST_BYTES, cut: bool = False, pipes: 
             raise FileError(f"{path} is a folder, not a file")
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind):
             raise FileError(f"{path} is a device, not a file")
-        if not stat.S_ISREG(kind) and not pipes:
-            raise FileError(f"{path} is a pipe, not a file")
         with open(path, "rb") as stream:
             return _up_to(stream, most, name=os.fspath(path), cut=cut)
     except (FileNotFoundError, NotADirectoryError):

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import click
 
 from p3i.cli import report
-from p3i.errors import FileError, P3IError
+from p3i.errors import P3IError
 
 
 class Entry(NamedTuple):
@@ -102,7 +102,6 @@ def run(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     as_json = report.wants_json(words)
     try:
-        _refuse_a_folder_that_is_gone()
         outcome = _invoke(words)
         sys.stdout.flush()
         # bool is an int too, and a command that returns True has not failed.
@@ -137,14 +136,6 @@ def _invoke(words: list[str]) -> object:
             return cli.invoke(context)
     except click.exceptions.Exit as leaving:
         return leaving.exit_code
-
-
-def _refuse_a_folder_that_is_gone() -> None:
-    """Raise FileError in a working folder that was removed: torch's MKL would end the process there."""
-    try:
-        os.getcwd()
-    except OSError:
-        raise FileError("the working folder is gone: change to another one") from None
 
 
 def _silence_stdout() -> None:

@@ -3,8 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -104,9 +102,15 @@ def test_the_photo_is_not_written_over_by_another_of_its_names(capsys: pytest.Ca
     assert Path("a.png").read_bytes() == before
 
 
-def test_a_working_folder_that_is_gone_is_said_to_be(folder: Path) -> None:
-    gone = f"import os; os.chdir('sub'); os.rmdir({str(folder / 'sub')!r})"
-    code = f"{gone}; from p3i.cli.main import main; main()"
-    words = ["rectify", str(folder / "a.png"), str(folder / "a.p3p"), "-o", str(folder / "out.png")]
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (3, "error: the working folder is gone: change to another one\n")
+@pytest.mark.parametrize(
+    "words", [["fmt", ""], ["fmt", "a.p3p", ""], ["examples", ""], ["render", "a.p3p", ""]]
+)
+def test_an_empty_name_is_wrong_usage_and_touches_nothing(
+    words: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("loose.p3p").write_text("Draw(x = 1,y=2)")
+    before = sorted(os.listdir(folder))
+    assert run(words) == 2
+    assert "empty" in capsys.readouterr().err
+    assert Path("loose.p3p").read_text() == "Draw(x = 1,y=2)"
+    assert sorted(os.listdir(folder)) == before
