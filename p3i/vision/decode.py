@@ -200,7 +200,7 @@ def _is_deep(picture: Pil.Image, data: bytes) -> bool:
 
 
 def _opencv_array(data: bytes) -> np.ndarray | None:
-    """The picture as OpenCV reads it, channels in RGB order, as stored (not turned); None if it cannot."""
+    """The picture as OpenCV reads it, [H, W(, C)] in RGB order, as stored (not turned); None if it cannot."""
     data = _without_tiff_orientation(data)
     array = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if array is not None and array.ndim == 3 and array.shape[2] >= 3:

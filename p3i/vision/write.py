@@ -74,7 +74,7 @@ def encode(
     text: Mapping[str, str] | None = None,
     dpi: float | None = None,
 ) -> bytes:
-    """The bytes of a picture file of `kind` (a suffix such as ".png"); the rest as in `write_image`."""
+    """The bytes of a picture file of `kind` (".png") of pixels [H, W, 3]; the rest as in `write_image`."""
     name = _FORMATS.get(kind.lower())
     if name is None:
         known = ", ".join(_FORMATS)
@@ -154,6 +154,7 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
 
 
 def _opencv_bytes(suffix: str, array: np.ndarray) -> bytes:
+    """The file that OpenCV makes of [H, W, 3 or 4] RGB(A)."""
     done, buffer = cv2.imencode(suffix, swap_red_blue(array))
     if not done:
         raise FileError(f"OpenCV could not encode a {array.shape[1]} x {array.shape[0]} {suffix} picture")
@@ -161,7 +162,7 @@ def _opencv_bytes(suffix: str, array: np.ndarray) -> bytes:
 
 
 def _quantized(values: np.ndarray, bits: int) -> np.ndarray:
-    """Float in 0..1, uint8 or uint16 -> unsigned integers of `bits`."""
+    """Float in 0..1, uint8 or uint16 [H, W, C] -> unsigned integers of `bits`, likewise."""
     if values.dtype == np.uint8:
         return values if bits == 8 else values.astype(np.uint16) * 257
     if values.dtype == np.uint16:
