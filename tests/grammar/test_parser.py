@@ -1,4 +1,4 @@
-"""Reading: limits, the places of errors, spans and comments, and the shipped tables."""
+"""Reading: limits, the places of errors, spans and comments."""
 
 import random
 from pathlib import Path
@@ -108,7 +108,7 @@ def test_the_highest_nesting_that_can_be_allowed_is_read_and_printed(monkeypatch
 
 
 def test_long_sums_and_signs_need_no_deep_stack() -> None:
-    draw = program("Draw(x=" + "i + " * 0 + "1 + " * 20_000 + "1, y=" + "-" * 19_001 + "2)").world
+    draw = program("Draw(x=" + "1 + " * 20_000 + "1, y=" + "-" * 19_001 + "2)").world
     assert isinstance(draw, Draw)
     assert (draw.x, draw.y) == (Affine(constant=20_001), Affine(constant=-2))
 

@@ -184,6 +184,8 @@ def test_a_jpeg_is_read_as_its_decoder_says_with_its_profile_kept(tmp_path):
     profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     path = saved(tmp_path / "a.jpg", scene(), quality=100, icc_profile=profile)
     image = read_image(path)
+    with Pil.open(path) as picture:
+        np.testing.assert_allclose(image.pixels, np.asarray(picture) / 255, atol=1e-6)
     assert image.source.icc == profile
     assert image.source.format == "JPEG"
 
