@@ -9,6 +9,7 @@ Every name is loaded when it is first used: `p3i.check` and `p3i.format` never i
 """
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -95,6 +96,10 @@ __all__ = [  # noqa: RUF022  # in the order of use
     "EditOptions",
     "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
 ]  # fmt: skip
+
+
+if "IPython" in sys.modules:  # a notebook draws what it shows
+    importlib.import_module("p3i.notebook").register(sys.modules["IPython"])
 
 
 def __getattr__(name: str) -> Any:

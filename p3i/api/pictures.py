@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from p3i import files
 from p3i.api.search import Progress, read_image, synth, without
 from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Program
@@ -102,7 +103,9 @@ def points(
     elif given is None:
         assert isinstance(program, str | os.PathLike)
         given = read_program(program)
-    name = Path(image).name if isinstance(image, str | os.PathLike) and os.fspath(image) != "-" else None
+    name = None
+    if isinstance(image, str | os.PathLike) and os.fspath(image) != "-":
+        name = files.as_text(Path(image).name)
     if image is None:
         assert given is not None
         return objects_of(given, None, options, **changes)

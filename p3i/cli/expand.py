@@ -6,7 +6,7 @@ import click
 
 from p3i import language
 from p3i.cli import options, programs
-from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import number_text
 from p3i.interp.unroll import Point
 

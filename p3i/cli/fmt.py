@@ -7,8 +7,8 @@ import click
 from p3i import language
 from p3i.cli import options, programs, report
 from p3i.errors import P3IError, UsageError
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.layout import source_text
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import Layout
 
 

@@ -67,12 +67,13 @@ class Outputs:
         for path in (picture, facts):
             if path not in (None, "-"):
                 files.check_writable(Path(str(path)), force=given["force"])
-        taken = [str(Path(word).resolve()) for word in inputs if word not in (None, "-")]
-        written = [str(Path(str(path)).resolve()) for path in (picture, facts) if path not in (None, "-")]
-        if len(set(written)) < len(written):
+        written = [path for path in (picture, facts) if path is not None and path != "-"]
+        if len(written) == 2 and files.same_place(*written):
             raise UsageError(f"picture and facts would both be written to {written[0]}")
-        if clash := set(taken) & set(written):
-            raise UsageError(f"{sorted(clash)[0]} is read here: write to another file")
+        for word in (word for word in inputs if word is not None and word != "-"):
+            for path in written:
+                if files.same_place(word, path):
+                    raise UsageError(f"{path} is read here: write to another file")
         return cls(
             picture=picture,
             kind=kind,

@@ -11,8 +11,8 @@ from p3i import language
 from p3i.cli import report
 from p3i.errors import P3IError
 from p3i.files import gather
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.layout import most_bytes
+from p3i.grammar.parse_error import ParseError
 
 SUFFIXES = frozenset({".p3p"})
 STDIN = "-"

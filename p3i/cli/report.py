@@ -60,7 +60,7 @@ def p3i_error(error: P3IError, *, as_json: bool = False) -> int:
 
     It is one line, save for a program's text with errors, which is shown with all of them, as by `check`.
     """
-    from p3i.grammar.diagnostics import ParseError  # read here, so that `--help` does not
+    from p3i.grammar.parse_error import ParseError  # read here, so that `--help` does not
 
     if isinstance(error, ParseError):
         click.echo(error.report(as_json=as_json, color=coloured()), nl=False, err=True, color=coloured())

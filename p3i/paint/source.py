@@ -1,14 +1,15 @@
 """Where a program to be drawn comes from: its own text, or a picture that was drawn of it."""
 
-import sys
 from os import PathLike, fspath
+from os.path import isfile
 from pathlib import Path
 from xml.etree import ElementTree
 
 from p3i.errors import FileError
+from p3i.files import read_bytes
 from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.layout import source_text
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse
 from p3i.paint.svg import PROGRAM_TAG
 from p3i.vision.write import read_png_text
@@ -24,7 +25,7 @@ def read_program(path: str | PathLike[str]) -> Program:
     text is no program, or a sketch whose holes are still open.
     """
     name = "standard input" if fspath(path) == "-" else fspath(path)
-    data = sys.stdin.buffer.read() if fspath(path) == "-" else _bytes_of(Path(path))
+    data = read_bytes(path)
     text = program_text_in(data, name=name)
     source: str | bytes = data if text is None else text
     parsed = parse(source)
@@ -38,10 +39,10 @@ def is_photo(path: str | PathLike[str]) -> bool:
 
     Files that cannot be read are no photos: their reader says why.
     """
-    if fspath(path) == "-" or Path(path).suffix.lower() == ".p3p" or not Path(path).is_file():
+    if fspath(path) == "-" or Path(path).suffix.lower() == ".p3p" or not isfile(path):
         return False
     try:
-        data = _bytes_of(Path(path))
+        data = read_bytes(path)
     except FileError:
         return False
     if data.startswith(b"\x89PNG\r\n\x1a\n"):
@@ -82,15 +83,3 @@ def _text_of_svg(data: bytes, *, name: str) -> str | None:
         raise FileError(f"{name} is damaged SVG or XML: {error}") from None
     found = root.find(f".//{PROGRAM_TAG}")
     return None if found is None else found.text
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise FileError(f"there is no file {path}") from None
-    except IsADirectoryError:
-        raise FileError(f"{path} is a folder, not a program") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise FileError(f"{path} cannot be read: {reason}") from None

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from p3i.errors import SketchError
 from p3i.grammar.ast import Header
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.leaves import with_leaves
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.camera import Camera

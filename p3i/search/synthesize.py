@@ -29,7 +29,7 @@ from p3i.search.result import (
 from p3i.search.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
-from p3i.vision.threads import limit_threads
+from p3i.vision.threads import limited_threads
 
 # Pictures below this many pixels a side, or with less than this share known, are not searched.
 _LEAST_SIDE = 32
@@ -52,7 +52,14 @@ def synthesize(
     The result's `program` is None where nothing reaches the score NEEDED; then `stop` and `score` say why.
     The program has no header yet. A KeyboardInterrupt ends the search with the best that was found.
     """
-    limit_threads(config.threads)
+    with limited_threads(config.threads):
+        return _searched(image, config, progress, trace)
+
+
+def _searched(
+    image: Image, config: SearchConfig, progress: Progress | None, trace: Trace | None
+) -> SynthesisResult:
+    """`synthesize`, however many threads there are."""
     assumed = focal_of(image, config)
     focal_mm, _ = assumed
 

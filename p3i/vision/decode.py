@@ -63,10 +63,7 @@ def decode(data: bytes, *, name: str, max_px: int) -> Decoded:
     """
     if not data:
         raise FileError(f"{name} is empty (0 bytes)")
-    cv2.utils.logging.setLogLevel(
-        cv2.utils.logging.LOG_LEVEL_SILENT
-    )  # its warnings about odd tags go straight to stderr, past our own messages
-    with _own_pixel_limit():
+    with _own_pixel_limit(), _silent_opencv():
         try:
             return _decode(data, name=name, max_px=max_px)
         except FileError:
@@ -203,7 +200,7 @@ def _is_deep(picture: Pil.Image, data: bytes) -> bool:
 
 
 def _opencv_array(data: bytes) -> np.ndarray | None:
-    """The picture as OpenCV reads it, channels in RGB order, as stored (not turned); None if it cannot."""
+    """The picture as OpenCV reads it, [H, W(, C)] in RGB order, as stored (not turned); None if it cannot."""
     data = _without_tiff_orientation(data)
     array = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if array is not None and array.ndim == 3 and array.shape[2] >= 3:
@@ -311,6 +308,17 @@ def _own_pixel_limit() -> Iterator[None]:
             yield
     finally:
         Pil.MAX_IMAGE_PIXELS = before
+
+
+@contextmanager
+def _silent_opencv() -> Iterator[None]:
+    """OpenCV's warnings about odd tags go straight to stderr, past our own messages: not while we decode."""
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(before)
 
 
 def _frames_note(picture: Pil.Image) -> tuple[str, ...]:

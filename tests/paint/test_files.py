@@ -11,6 +11,7 @@ import pytest
 
 from p3i.errors import FileError, ProgramError
 from p3i.paint.draw import render
+from p3i.paint.picture import Picture
 from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.svg import joined, number
 from p3i.size import Size
@@ -126,3 +127,12 @@ def test_a_program_with_errors_is_shown_with_its_place(tmp_path: Path) -> None:
     write_image(carried, np.zeros((4, 4, 3), np.uint8), text={PNG_KEYWORD: "Draw(x=i*j, y=0)"})
     with pytest.raises(ProgramError, match=r"carried\.png:1"):
         read_program(carried)
+
+
+def test_a_deep_tiff_says_what_it_loses_without_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    deep = Picture(np.zeros((2, 3, 3), np.uint16), icc=b"profile")
+    assert deep.notes("tiff") == ()
+    monkeypatch.setattr("p3i.paint.picture.has_tifffile", lambda: False)
+    (note,) = deep.notes("tiff")
+    assert "p3i[tiff]" in note
+    assert Picture(np.zeros((2, 3, 3), np.uint16)).notes("tiff") == deep.notes("png") == ()
