@@ -12,74 +12,49 @@ from typing import Any, Literal
 import click
 
 from p3i import api, files
-from p3i.cli import options, progress, report, search_options
+from p3i.cli import grouped, options, progress, report
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
-from p3i.records import told
-from p3i.search.config import EXTENTS, RECIPES, STRUCTURES, SearchConfig
+from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, StopReason, SynthesisResult
 
-sentence, default = told(SearchConfig)
 
-
-class NumberOrWord(click.ParamType):
-    """A number that is `what`, or one of the words, each of which means a value."""
-
-    def __init__(self, unit: str, what: str, words: Mapping[str, str | None]) -> None:
-        self.name = "|".join((unit, *words))
-        self.what, self.words = what, words
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float | str | None:
-        word = str(value).strip().lower()
-        if word in self.words:
-            return self.words[word]
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"{value!r} is neither {self.what} nor {' nor '.join(self.words)}", param, ctx)
-
-
-FOCAL = NumberOrWord("MM", "a focal length in mm", {"auto": "auto"})
-LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
-
-
-@click.command("synth", short_help="Find the camera and the program of a photo's pattern.")
+@grouped.command("synth", short_help="Find the camera and the program of a photo's pattern.")
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["p3p", "jsonl"]),
-    default=None,
-    help="Print a program, or one JSON object a line and photo. [default: by the name of -o, else p3p]",
+@grouped.group(
+    "Output",
+    click.option(
+        "--format",
+        "form",
+        type=click.Choice(["p3p", "jsonl"]),
+        default=None,
+        help="Print a program, or one JSON object a line and photo. [default: by the name of -o, else p3p]",
+    ),
+    options.output("Where to write; - is stdout. Several photos need a folder, or --format jsonl."),
+    options.force,
+    options.of(SearchConfig, "top"),
+    click.option("--trace", type=click.Path(), metavar="FILE", help="Write the search's steps, JSON lines."),
 )
-@options.output("Where to write; - is stdout. Several photos need a folder, or --format jsonl.")
-@options.force
-@options.field(SearchConfig, "structure", metavar="|".join(STRUCTURES))
-@options.field(SearchConfig, "extent", type=click.Choice(EXTENTS))
-@click.option("--sketch", type=click.Path(), metavar="FILE", help=sentence("sketch"))
-@click.option("--start", type=click.Path(), metavar="FILE", help=sentence("start"))
-@options.field(SearchConfig, "recipe", type=click.Choice(RECIPES))
-@click.option("--exhaustive", "exhaustive_s", type=float, metavar="SECONDS", help=sentence("exhaustive_s"))
-@click.option("--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown.")
-@click.option(
-    "--roi",
-    metavar="X,Y,W,H|POINTS",
-    help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
+@grouped.group(
+    "What to look for",
+    options.of(SearchConfig, "structure", "extent", "sketch", "start", "strict"),
+    click.option(
+        "--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown."
+    ),
+    click.option(
+        "--roi",
+        metavar="X,Y,W,H|POINTS",
+        help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
+    ),
 )
-@click.option("--focal", "focal_mm", type=FOCAL, metavar=FOCAL.name, help=sentence("focal_mm"))
-@click.option("--lens", type=LENS, metavar=LENS.name, help=sentence("lens"))
-@search_options.features
-@search_options.weights
-@click.option("--strict", is_flag=True, help=sentence("strict"))
-@click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@options.field(SearchConfig, "top", type=int, metavar="K")
-@options.field(SearchConfig, "seed", type=int)
-@search_options.device
-@search_options.threads
-@click.option("--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height).")
-@click.option("--trace", type=click.Path(), metavar="FILE", help="Write the search's steps, JSON lines.")
+@grouped.group("The camera", options.of(SearchConfig, "focal_mm", "lens"))
+@grouped.group(
+    "The search",
+    options.of(SearchConfig, "recipe", "exhaustive_s", "features", "weights", "time_s", "seed", "threads"),
+    click.option(
+        "--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height)."
+    ),
+)
 @options.quiet
 @options.verbose
 @options.error_format
@@ -115,14 +90,9 @@ class Call:
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Call":
         """The call that the options of the command line mean; raises UsageError or FileError."""
-        names = {field.name for field in dataclasses.fields(SearchConfig)}
-        chosen = {name: value for name, value in given.items() if name in names}
-        if chosen["weights"] is not None:
-            chosen["weights"] = Path(chosen["weights"])
-        for name, reader in (("sketch", api.load_sketch), ("start", api.load)):
-            if chosen[name] is not None:
-                chosen[name] = reader(chosen[name])
-        config = SearchConfig(**chosen)
+        readers = {"sketch": api.load_sketch, "start": api.load}
+        read = {name: None if given[name] is None else readers[name](given[name]) for name in readers}
+        config = options.chosen(SearchConfig, given, **read)
         photos = tuple(files.gather(given["images"], suffixes=SUFFIXES))
         output: str | None = given["output"]
         form = given["form"] or ("jsonl" if output and Path(output).suffix == ".jsonl" else "p3p")

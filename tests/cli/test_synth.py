@@ -295,7 +295,7 @@ def test_trace_writes_the_steps_of_each_photo(photo) -> None:
 def test_every_option_of_the_search_arrives_there(photo, search) -> None:
     photo("a.png")
     search_words = "--structure lattice --extent image --focal 28 --features rgb --strict --time 3.5"
-    words = shlex.split(f"{search_words} --top 2 --seed 7 --device cpu --threads 2 --format jsonl")
+    words = shlex.split(f"{search_words} --top 2 --seed 7 --threads 2 --format jsonl")
     assert run(["synth", "a.png", *words]) == 0
     assert search.configs == [
         SearchConfig(
@@ -307,7 +307,6 @@ def test_every_option_of_the_search_arrives_there(photo, search) -> None:
             time_s=3.5,
             top=2,
             seed=7,
-            device="cpu",
             threads=2,
         )
     ]
