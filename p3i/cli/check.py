@@ -11,7 +11,7 @@ from p3i.grammar.layout import source_text
 from p3i.grammar.report import report_human, report_json, summary
 
 
-@grouped.command("check", short_help="Report what is wrong, or odd, in programs.")
+@grouped.command("check")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @click.option("--strict", is_flag=True, help="Hold the programs to Table 1 of the paper, to the letter.")
 @options.quiet

@@ -14,7 +14,7 @@ from p3i.records import told
 sentence, _ = told(EditOptions)
 
 
-@grouped.command("edit", short_help="Lay a photo's objects anew by a changed program.")
+@grouped.command("edit")
 @click.argument("photo", metavar="PHOTO", type=click.Path())
 @click.argument("old", metavar="OLD", type=click.Path())
 @click.argument("new", metavar="NEW", type=click.Path())

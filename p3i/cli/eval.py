@@ -27,7 +27,7 @@ _GROUP = (
 )  # fmt: skip
 
 
-@grouped.command("eval", short_help="Measure p3i on an annotated set of photos.")
+@grouped.command("eval")
 @click.argument("folder", metavar="SET", type=click.Path())
 @grouped.group(
     "What to score",

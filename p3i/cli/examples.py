@@ -6,7 +6,7 @@ from p3i import api
 from p3i.cli import grouped, options, progress
 
 
-@grouped.command("examples", short_help="Draw scenes whose program is known, as a set to measure with.")
+@grouped.command("examples")
 @click.argument("folder", metavar="DIR")
 @click.option(
     "--seed", type=int, default=0, show_default=True, help="Which set; equal seeds give equal files."

@@ -11,7 +11,7 @@ from p3i.grammar.printer import number_text
 from p3i.interp.unroll import Point
 
 
-@grouped.command("expand", short_help="List the objects that a program draws.")
+@grouped.command("expand")
 @click.argument("file", metavar="FILE")
 @click.option(
     "--format",

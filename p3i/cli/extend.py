@@ -14,7 +14,7 @@ from p3i.records import told
 sentence, default = told(ExtendOptions)
 
 
-@grouped.command("extend", short_help="Continue a photo beyond its frame by its pattern.")
+@grouped.command("extend")
 @options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option

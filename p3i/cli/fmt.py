@@ -12,7 +12,7 @@ from p3i.grammar.layout import source_text
 from p3i.grammar.printer import Layout
 
 
-@grouped.command("fmt", short_help="Rewrite programs in their canonical text.")
+@grouped.command("fmt")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; exit 1 if a file would change.")
 @click.option("--diff", "only_diff", is_flag=True, help="Write nothing; print what would change.")

@@ -37,9 +37,9 @@ class Command(click.Command):
                 formatter.write_dl(records)
 
 
-def command(name: str, *, short_help: str) -> Callable[[Callable[..., Any]], Command]:
-    """Make a function the command `name` of p3i."""
-    return click.command(name, cls=Command, short_help=short_help)
+def command(name: str) -> Callable[[Callable[..., Any]], Command]:
+    """Make a function the command `name`; what `p3i --help` says of it stands in p3i.cli.main.COMMANDS."""
+    return click.command(name, cls=Command)
 
 
 def group(title: str, *decorators: Decorator) -> Decorator:

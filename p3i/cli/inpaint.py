@@ -16,7 +16,7 @@ from p3i.records import told
 sentence, default = told(InpaintOptions)
 
 
-@grouped.command("inpaint", short_help="Fill a hole in a photo by its pattern.")
+@grouped.command("inpaint")
 @options.photo_and_program
 @click.option("--mask", metavar="FILE", type=click.Path(), help="A picture whose white pixels are filled.")
 @click.option(

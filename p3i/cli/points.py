@@ -26,7 +26,7 @@ _SUFFIXES = frozenset({".p3p"})
 _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
 
 
-@grouped.command("points", short_help="List the objects: places, names, cells, and whether each is there.")
+@grouped.command("points")
 @click.argument("programs", metavar="PROG|PHOTO...", nargs=-1, required=True)
 @options.output("Where to write, the format by the suffix; - is stdout. Several inputs need a folder.")
 @click.option(

@@ -15,7 +15,7 @@ from p3i.records import told
 sentence, default = told(RectifyOptions)
 
 
-@grouped.command("rectify", short_help="Straighten a photo by its program.")
+@grouped.command("rectify")
 @options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option

@@ -38,7 +38,7 @@ class SizeType(click.ParamType):
         return Size(int(found[1]), int(found[2]))
 
 
-@grouped.command("render", short_help="Draw a program as PNG, SVG or PDF, also over its photo.")
+@grouped.command("render")
 @click.argument("programs", metavar="PROG...", nargs=-1, required=True)
 @options.output("Where to draw, the kind by the suffix; - is stdout. Several programs need a folder.")
 @click.option(

@@ -10,7 +10,7 @@ from p3i.cli import grouped, options
 from p3i.search.config import SearchConfig
 
 
-@grouped.command("score", short_help="Say how well a program explains a photo.")
+@grouped.command("score")
 @click.argument("image", metavar="IMAGE", type=click.Path())
 @click.argument("program", metavar="PROG", type=click.Path())
 @click.option(

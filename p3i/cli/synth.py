@@ -19,7 +19,7 @@ from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, StopReason, SynthesisResult
 
 
-@grouped.command("synth", short_help="Find the camera and the program of a photo's pattern.")
+@grouped.command("synth")
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True)
 @grouped.group(
     "Output",

@@ -9,7 +9,7 @@ from p3i.errors import UsageError
 from p3i.paint.tile_options import TileOptions
 
 
-@grouped.command("tile", short_help="Make a seamless texture of a photo's pattern.")
+@grouped.command("tile")
 @options.photo_and_program
 @grouped.group("Tile", options.of(TileOptions))
 @grouped.group(

@@ -11,7 +11,7 @@ from p3i.errors import UsageError
 _KINDS = (".gif", ".png")
 
 
-@grouped.command("trace", short_help="Show a search as a moving picture.")
+@grouped.command("trace")
 @click.argument("trace", metavar="TRACE", type=click.Path())
 @options.output("Where to draw: a .gif moves, a .png is a contact sheet.")
 @click.option("--image", metavar="PHOTO", help="The photo, where it is not where the trace says; or which.")

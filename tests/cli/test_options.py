@@ -41,7 +41,7 @@ def read(*words: str, declare: Any = None) -> Sample:
     """The record that the command line `words` makes; raises click's errors."""
     found: list[Sample] = []
 
-    @grouped.command("sample", short_help="")
+    @grouped.command("sample")
     @(declare or options.of(Sample))
     def command(**given: Any) -> None:
         found.append(options.chosen(Sample, given))
@@ -55,7 +55,7 @@ def help_of(*decorators: Any) -> str:
 
     for decorator in reversed(decorators):
         body = decorator(body)
-    command = grouped.command("sample", short_help="")(click.argument("photo", metavar="PHOTO")(body))
+    command = grouped.command("sample")(click.argument("photo", metavar="PHOTO")(body))
     return CliRunner().invoke(command, ["--help"]).output
 
 
