@@ -17,9 +17,7 @@ from p3i.records import told
 sentence, default = told(ShowOptions)
 
 
-@grouped.command(
-    "show", short_help="Draw the program over its photo: objects, cells, names, horizon, extent."
-)
+@grouped.command("show")
 @click.argument("photo", metavar="PHOTO")
 @click.argument("program", metavar="[PROG]", required=False)
 @options.output("Where to draw, the kind by the suffix; - is stdout.")
