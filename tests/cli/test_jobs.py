@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -88,6 +90,29 @@ def test_no_process_outlives_the_pool(tmp_path: Path, monkeypatch: pytest.Monkey
     found.close()
     with pytest.raises(ProcessLookupError):
         os.kill(int(first[0].seconds), 0)
+
+
+def test_the_script_that_was_started_is_not_run_again(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from pathlib import Path\n"
+        "import solvers\n"
+        "from p3i.cli import workers\n"
+        "from p3i.cli.solving import Task\n"
+        "from p3i.search.config import SearchConfig\n"
+        "tasks = [Task(photo=Path(name), config=SearchConfig()) for name in ('a_quick', 'b_quick')]\n"
+        "with workers.pool(tasks, jobs=2, traced=False, told=False, solve=solvers.solve) as pool:\n"
+        "    print([pool.answer(number, print)[0].code for number in (0, 1)])\n"
+    )
+    path = os.pathsep.join(map(str, (Path(__file__).parents[1], Path(__file__).parents[2])))
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.stdout, done.stderr) == ("[0, 0]\n", "")
 
 
 def paint(path: Path, kind: str) -> None:
