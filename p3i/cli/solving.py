@@ -51,6 +51,11 @@ class Outcome:
     seconds: float = 0.0
 
 
+def prepare() -> None:
+    """Load what the search needs, torch above all, before the first photo's clock starts."""
+    import p3i.search.synthesize  # noqa: F401
+
+
 def solve(task: Task, *, update: api.Progress, note: Note | None = None) -> Outcome:
     """Synthesize one photo; every failure but a closed pipe becomes an Outcome, so a batch goes on.
 

@@ -14,7 +14,7 @@ import click
 from p3i import api, files
 from p3i.cli import grouped, options, progress, report, workers
 from p3i.cli.photos import SUFFIXES, parse_roi
-from p3i.cli.solving import Outcome, Task, failure, solve
+from p3i.cli.solving import Outcome, Task, failure, prepare, solve
 from p3i.errors import P3IError, UsageError
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, StopReason
@@ -181,8 +181,8 @@ def _answers(
 
             yield wait
         return
-    import p3i.search.synthesize  # noqa: F401  # torch loads before the first photo's clock starts
-
+    with workers.held_back("SIGINT", "SIGTERM"):  # torch ends the process where its loading is cut short
+        prepare()
     interrupted = False
 
     def work(number: int, update: api.Progress) -> Outcome | None:

@@ -16,6 +16,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -45,9 +46,8 @@ class _Worker:
 class Pool:
     """Up to `jobs` processes for `tasks`; use `pool`, which ends them."""
 
-    def __init__(self, tasks: Sequence[Task], *, jobs: int, solve: Solve, traced: bool, told: bool) -> None:
-        self._tasks, self._jobs = tasks, jobs
-        self._how = (solve, traced, told)
+    def __init__(self, tasks: Sequence[Task], *, jobs: int, how: tuple[Any, ...]) -> None:
+        self._tasks, self._jobs, self._how = tasks, jobs, how
         self._waiting = deque(range(len(tasks)))
         self._workers: list[_Worker] = []
         self._answers: dict[int, tuple[Outcome, Steps]] = {}
@@ -104,7 +104,9 @@ class Pool:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_work, args=(theirs, *self._how), daemon=True)
-        with _interrupts_kept_back(), _no_script():
+        resource_tracker.ensure_running()  # which would let go of the signals when `start` began it
+        # Ctrl-C reaches all processes of a terminal; the workers are told by this one, and once.
+        with held_back("SIGINT"), _no_script():
             process.start()
         theirs.close()  # so that the pipe ends with the worker
         self._workers.append(_Worker(process, ours))
@@ -151,13 +153,20 @@ class Pool:
 
 @contextlib.contextmanager
 def pool(
-    tasks: Sequence[Task], *, jobs: int, traced: bool, told: bool, solve: Solve = solving.solve
+    tasks: Sequence[Task],
+    *,
+    jobs: int,
+    traced: bool,
+    told: bool,
+    solve: Solve = solving.solve,
+    prepare: Callable[[], None] = solving.prepare,
 ) -> Iterator[Pool]:
     """A Pool for the tasks, that is told of interrupts, and whose processes end with the block.
 
-    `traced` says whether the steps of the searches are wanted, `told` whether progress is.
+    `traced` says whether the steps of the searches are wanted, `told` whether progress is. Each process calls
+    `prepare` once, which no interrupt cuts short.
     """
-    made = Pool(tasks, jobs=min(jobs, len(tasks)), solve=solve, traced=traced, told=told)
+    made = Pool(tasks, jobs=min(jobs, len(tasks)), how=(solve, prepare, traced, told))
     try:
         with _interrupting(made):
             yield made
@@ -192,15 +201,13 @@ def _interrupting(made: Pool) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _interrupts_kept_back() -> Iterator[None]:
-    """Hold SIGINT back meanwhile, and for ever in a process that is started here.
-
-    Ctrl-C reaches all processes of a terminal; the workers are told by ours, and once.
-    """
+def held_back(*names: str) -> Iterator[None]:
+    """Hold signals back meanwhile, such as "SIGINT", and for ever in a process that is started here."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    numbers = {getattr(signal, name) for name in names}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     try:
         yield
     finally:
@@ -218,7 +225,7 @@ def _no_script() -> Iterator[None]:
         sys.modules["__main__"] = script
 
 
-def _work(pipe: Connection, solve: Solve, traced: bool, told: bool) -> None:
+def _work(pipe: Connection, solve: Solve, prepare: Callable[[], None], traced: bool, told: bool) -> None:
     """The life of a worker: a task in, an outcome with its steps out, until the pipe is closed."""
     asked = solving_now = False
 
@@ -229,10 +236,12 @@ def _work(pipe: Connection, solve: Solve, traced: bool, told: bool) -> None:
             solving_now = False  # the second time the answer is being made: let it
             raise KeyboardInterrupt
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, interrupt)
     if not os.environ.get("P3I_DEBUG"):
         warnings.simplefilter("ignore")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    prepare()
     last = 0.0
 
     def update(stage: str, fraction: float) -> None:

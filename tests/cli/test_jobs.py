@@ -23,9 +23,12 @@ from p3i.search.config import SearchConfig
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
+STAND_IN = {"solve": solvers.solve, "prepare": solvers.prepare}
+
+
 def outcomes(*names: str, jobs: int = 2, traced: bool = False) -> Iterator[tuple[Outcome, list[str]] | None]:
     tasks = [Task(photo=Path(f"{name}.png"), config=SearchConfig()) for name in names]
-    with workers.pool(tasks, jobs=jobs, traced=traced, told=False, solve=solvers.solve) as pool:
+    with workers.pool(tasks, jobs=jobs, traced=traced, told=False, **STAND_IN) as pool:
         for number in range(len(tasks)):
             yield pool.answer(number, lambda _stage, _fraction: None)
 
@@ -66,6 +69,56 @@ def test_an_interrupt_asks_each_process_once_and_begins_nothing_more(
     assert [(one[0].code, one[0].error) for one in found if one][:2] == [(0, ""), (130, "best so far")]
 
 
+def test_an_interrupt_waits_until_a_process_has_loaded_what_it_needs(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("prepare.slowly").touch()
+    signalled(signal.SIGINT, after="prepare.begun")
+    found = list(outcomes("a_quick"))
+    assert [one and one[0].code for one in found] == [130]
+    assert Path("prepare.ended").exists()
+
+
+def test_ctrl_c_reaches_every_process_of_a_terminal_and_is_one_interrupt(tmp_path: Path) -> None:
+    script = (
+        "import solvers\n"
+        "from pathlib import Path\n"
+        "from p3i.cli import workers\n"
+        "from p3i.cli.solving import Task\n"
+        "from p3i.search.config import SearchConfig\n"
+        "tasks = [Task(photo=Path(name), config=SearchConfig()) for name in ('a_hangs', 'b_hangs')]\n"
+        "with workers.pool(tasks, jobs=2, traced=False, told=False, solve=solvers.solve,\n"
+        "    prepare=solvers.prepare) as pool:\n"
+        "    print([pool.answer(number, print)[0].error for number in (0, 1)])\n"
+    )
+    with started(script, tmp_path) as process:
+        while not all((tmp_path / f"{name}_hangs.begun").exists() for name in "ab"):
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert (out, err) == ("['best so far', 'best so far']\n", "")
+    (tmp_path / "prepare.slowly").touch()
+    with started(script, tmp_path) as process:
+        while not (tmp_path / "prepare.begun").exists():
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+    assert err == "" and out.count("interrupted before") == 2
+
+
+def started(script: str, folder: Path) -> subprocess.Popen[str]:
+    """A Python that runs a script in a process group of its own, as a shell starts it."""
+    path = os.pathsep.join(map(str, (Path(__file__).parents[1], Path(__file__).parents[2])))
+    return subprocess.Popen(
+        [sys.executable, "-c", script],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
 def test_a_second_interrupt_ends_what_does_not_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,7 +154,8 @@ def test_the_script_that_was_started_is_not_run_again(tmp_path: Path) -> None:
         "from p3i.cli.solving import Task\n"
         "from p3i.search.config import SearchConfig\n"
         "tasks = [Task(photo=Path(name), config=SearchConfig()) for name in ('a_quick', 'b_quick')]\n"
-        "with workers.pool(tasks, jobs=2, traced=False, told=False, solve=solvers.solve) as pool:\n"
+        "with workers.pool(tasks, jobs=2, traced=False, told=False, solve=solvers.solve,\n"
+        "    prepare=solvers.prepare) as pool:\n"
         "    print([pool.answer(number, print)[0].code for number in (0, 1)])\n"
     )
     path = os.pathsep.join(map(str, (Path(__file__).parents[1], Path(__file__).parents[2])))
