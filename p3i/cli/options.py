@@ -143,6 +143,8 @@ def _option(found: Field, changes: Mapping[str, Any]) -> Decorator:
         rest.setdefault("metavar", found.spelt.metavar)
     elif isinstance(rest.get("type"), Value | FilePath | NumberOrWord):
         rest.setdefault("metavar", rest["type"].name)
+    if kind is bool and not any("/" in word for word in words):
+        rest["is_flag"] = True
     default = {"default": found.default, "show_default": _shown(found.default)}
     return click.option(*words, found.name, help=found.sentence, **{**default, **rest})
 

@@ -1,5 +1,6 @@
 """Options made from an annotated record: what click then takes, says and gives back."""
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -8,6 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
+import p3i
 from p3i.cli import grouped, options
 from p3i.errors import UsageError
 from p3i.records import Spelt
@@ -16,6 +18,9 @@ from p3i.records import Spelt
 def parse_pair(text: str) -> tuple[int, int]:
     first, second = text.split(":")
     return int(first), int(second)
+
+
+RECORDS = [getattr(p3i, name) for name in p3i.__all__ if name.endswith(("Options", "Config"))]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,3 +147,18 @@ def test_a_field_whose_text_nobody_reads_is_refused_when_it_is_declared() -> Non
 
     with pytest.raises(TypeError, match="thing"):
         options.of(Odd)(lambda: None)
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.__name__)
+def test_every_record_of_p3i_can_be_made_into_options(record: Any) -> None:
+    found: list[Any] = []
+
+    @grouped.command("sample")
+    @options.of(record)
+    def command(**given: Any) -> None:
+        found.append(options.chosen(record, given))
+
+    command.main([], standalone_mode=False)
+    assert found == [record()]
+    fields = {field.name for field in dataclasses.fields(record)}
+    assert {param.name for param in command.params} == fields
