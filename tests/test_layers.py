@@ -28,6 +28,7 @@ ALLOWED: dict[str, set[str]] = {
     "p3i.evaluation": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language"},
     "p3i.api": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.evaluation"},
     "p3i.cli": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
+    "p3i.__main__": {"p3i.cli"},
     # The package itself re-exports lazily, and imports nothing.
     "p3i": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
 }

@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import options, progress
+from p3i.cli import grouped, options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
 from p3i.paint.edit_options import EditOptions, parse_scale
@@ -14,7 +14,7 @@ from p3i.records import told
 sentence, _ = told(EditOptions)
 
 
-@click.command("edit", short_help="Lay a photo's objects anew by a changed program.")
+@grouped.command("edit")
 @click.argument("photo", metavar="PHOTO", type=click.Path())
 @click.argument("old", metavar="OLD", type=click.Path())
 @click.argument("new", metavar="NEW", type=click.Path())

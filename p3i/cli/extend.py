@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import options, progress
+from p3i.cli import grouped, options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
 from p3i.paint.extend_options import ExtendOptions, parse_margins
@@ -14,7 +14,7 @@ from p3i.records import told
 sentence, default = told(ExtendOptions)
 
 
-@click.command("extend", short_help="Continue a photo beyond its frame by its pattern.")
+@grouped.command("extend")
 @options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import options, progress
+from p3i.cli import grouped, options, progress
 from p3i.cli.pictures import Outputs, kind_option
 from p3i.errors import UsageError
 from p3i.paint.inpaint_options import METHODS, InpaintOptions
@@ -16,7 +16,7 @@ from p3i.records import told
 sentence, default = told(InpaintOptions)
 
 
-@click.command("inpaint", short_help="Fill a hole in a photo by its pattern.")
+@grouped.command("inpaint")
 @options.photo_and_program
 @click.option("--mask", metavar="FILE", type=click.Path(), help="A picture whose white pixels are filled.")
 @click.option(

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from p3i import api, files
-from p3i.cli import options, photos, progress, report
+from p3i.cli import grouped, options, photos, progress, report
 from p3i.cli.render import SizeType
 from p3i.cli.targets import targets
 from p3i.errors import P3IError, UsageError
@@ -26,7 +26,7 @@ _SUFFIXES = frozenset({".p3p"})
 _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
 
 
-@click.command("points", short_help="List the objects: places, names, cells, and whether each is there.")
+@grouped.command("points")
 @click.argument("programs", metavar="PROG|PHOTO...", nargs=-1, required=True)
 @options.output("Where to write, the format by the suffix; - is stdout. Several inputs need a folder.")
 @click.option(

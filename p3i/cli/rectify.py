@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import options, progress
+from p3i.cli import grouped, options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
 from p3i.paint.rectify_options import CROPS, RectifyOptions, parse_cell
@@ -15,7 +15,7 @@ from p3i.records import told
 sentence, default = told(RectifyOptions)
 
 
-@click.command("rectify", short_help="Straighten a photo by its program.")
+@grouped.command("rectify")
 @options.photo_and_program
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option

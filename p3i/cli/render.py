@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from p3i import api, files
-from p3i.cli import options, report
+from p3i.cli import grouped, options, report
 from p3i.cli.targets import targets
 from p3i.errors import P3IError, UsageError
 from p3i.paint.options import KINDS, RenderOptions, kind_of
@@ -38,7 +38,7 @@ class SizeType(click.ParamType):
         return Size(int(found[1]), int(found[2]))
 
 
-@click.command("render", short_help="Draw a program as PNG, SVG or PDF, also over its photo.")
+@grouped.command("render")
 @click.argument("programs", metavar="PROG...", nargs=-1, required=True)
 @options.output("Where to draw, the kind by the suffix; - is stdout. Several programs need a folder.")
 @click.option(

@@ -1,17 +1,16 @@
 """`p3i score`: how well a program explains a photo."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import click
 
 from p3i import api
-from p3i.cli import options, search_options
+from p3i.cli import grouped, options
 from p3i.search.config import SearchConfig
 
 
-@click.command("score", short_help="Say how well a program explains a photo.")
+@grouped.command("score")
 @click.argument("image", metavar="IMAGE", type=click.Path())
 @click.argument("program", metavar="PROG", type=click.Path())
 @click.option(
@@ -29,21 +28,16 @@ from p3i.search.config import SearchConfig
     metavar="MM",
     help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
 )
-@search_options.features
-@search_options.weights
-@search_options.device
-@search_options.threads
+@options.of(SearchConfig, "features", "weights", "threads")
 @options.error_format
-def command(
-    image: str, program: str, form: str, weights: str | None, error_format: str, **chosen: Any
-) -> None:
+def command(image: str, program: str, form: str, error_format: str, **given: Any) -> None:
     """Compare the photo IMAGE with itself at the neighbouring draws of the program PROG.
 
     Prints equation 2 of the paper as printed there (the sum of squared feature differences over the
     edges; less is better, but a smaller pattern has less too) and the normalised score (more is better),
     by which `p3i synth` chooses.
     """
-    config = SearchConfig(weights=Path(weights) if weights else None, **chosen)
+    config = options.chosen(SearchConfig, given)
     found = api.score(image, program, config)
     if form == "json":
         record = {

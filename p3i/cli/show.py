@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from p3i import api, files
-from p3i.cli import options, progress, report
+from p3i.cli import grouped, options, progress, report
 from p3i.errors import UsageError
 from p3i.paint.options import KINDS, kind_of
 from p3i.paint.show_options import LABELS, ShowOptions
@@ -17,7 +17,7 @@ from p3i.records import told
 sentence, default = told(ShowOptions)
 
 
-@click.command("show", short_help="Draw the program over its photo: objects, cells, names, horizon, extent.")
+@grouped.command("show")
 @click.argument("photo", metavar="PHOTO")
 @click.argument("program", metavar="[PROG]", required=False)
 @options.output("Where to draw, the kind by the suffix; - is stdout.")
