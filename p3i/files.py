@@ -200,7 +200,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _standard_input() -> BinaryIO:
-    if sys.stdin is None or sys.stdin.closed:
+    if sys.stdin is None:
         raise FileError("standard input is closed: there is nothing to read from -")
     return sys.stdin.buffer
 
@@ -228,14 +228,14 @@ def _size(stream: BinaryIO) -> int:
 
 def _write_out(data: bytes) -> None:
     """Bytes to standard output. A closed pipe stays a BrokenPipeError, which ends a command silently."""
-    if sys.stdout is None or sys.stdout.closed:
+    if sys.stdout is None:
         raise FileError("standard output is closed: there is nowhere to write - to")
     try:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
     except BrokenPipeError:
         raise
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: it is closed
         raise FileError(f"standard output cannot be written: {_reason(error)}") from None
 
 
