@@ -78,13 +78,17 @@ def names_folder(text: str) -> bool:
     return text.endswith(("/", os.sep)) or os.path.isdir(named(text))
 
 
-def same_place(one: Name, other: Name) -> bool:
-    """Whether two names lead to one file, links followed, whether or not it exists; unsure is no."""
+def place_of(path: Name) -> tuple[int, int] | str:
+    """Where a name leads, equal for all names of one file: links are followed, and hard links are one.
+
+    It need not exist. Never raises: a name that leads nowhere stands for itself.
+    """
     with suppress(OSError, ValueError):
-        return os.path.samefile(one, other)
+        facts = os.stat(path)
+        return facts.st_dev, facts.st_ino
     with suppress(OSError, ValueError):
-        return os.path.realpath(one) == os.path.realpath(other)
-    return False
+        return os.path.realpath(path)
+    return os.fspath(path)
 
 
 def read_bytes(path: Name, *, most: int = MOST_BYTES, cut: bool = False) -> bytes:
