@@ -78,13 +78,17 @@ def names_folder(text: str) -> bool:
     return text.endswith(("/", os.sep)) or os.path.isdir(named(text))
 
 
-def same_place(one: Name, other: Name) -> bool:
-    """Whether two names lead to one file, links followed, whether or not it exists; unsure is no."""
+def place_of(path: Name) -> tuple[int, int] | str:
+    """Where a name leads, equal for all names of one file: links are followed, and hard links are one.
+
+    It need not exist. Never raises: a name that leads nowhere stands for itself.
+    """
     with suppress(OSError, ValueError):
-        return os.path.samefile(one, other)
+        facts = os.stat(path)
+        return facts.st_dev, facts.st_ino
     with suppress(OSError, ValueError):
-        return os.path.realpath(one) == os.path.realpath(other)
-    return False
+        return os.path.realpath(path)
+    return os.fspath(path)
 
 
 def read_bytes(path: Name, *, most: int = MOST_BYTES, cut: bool = False) -> bytes:
@@ -200,7 +204,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _standard_input() -> BinaryIO:
-    if sys.stdin is None or sys.stdin.closed:
+    if sys.stdin is None:
         raise FileError("standard input is closed: there is nothing to read from -")
     return sys.stdin.buffer
 
@@ -228,14 +232,14 @@ def _size(stream: BinaryIO) -> int:
 
 def _write_out(data: bytes) -> None:
     """Bytes to standard output. A closed pipe stays a BrokenPipeError, which ends a command silently."""
-    if sys.stdout is None or sys.stdout.closed:
+    if sys.stdout is None:
         raise FileError("standard output is closed: there is nowhere to write - to")
     try:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
     except BrokenPipeError:
         raise
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: it is closed
         raise FileError(f"standard output cannot be written: {_reason(error)}") from None
 
 

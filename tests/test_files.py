@@ -20,10 +20,10 @@ from p3i.files import (
     gather,
     make_folder,
     names_folder,
+    place_of,
     read_bytes,
     read_text,
     replacing,
-    same_place,
     write_bytes,
 )
 
@@ -297,18 +297,18 @@ def test_a_working_folder_that_is_gone_is_said_to_be(tmp_path: Path, monkeypatch
     ):
         with pytest.raises(FileError):
             use()
-    assert not same_place("a", "b")
+    assert place_of("a") != place_of("b")
     assert gather(["a"], suffixes=KINDS) == [Path("a")]
 
 
 def test_two_names_of_one_file_are_the_same_place() -> None:
     Path("link").symlink_to("b.jpg")
+    Path("loop").symlink_to("loop")
     os.link("b.jpg", "twin.jpg")
-    assert same_place("link", "sub/../b.jpg")
-    assert same_place("twin.jpg", "b.jpg")
-    assert same_place("new", "./new")
-    assert not same_place("b.jpg", "a.PNG")
-    assert not same_place("nul\0", "a.PNG")
+    one = place_of("b.jpg")
+    assert place_of("link") == place_of("sub/../b.jpg") == place_of("twin.jpg") == one
+    assert place_of("new") == place_of("./new") == place_of("sub/../new")
+    assert len({one, place_of("a.PNG"), place_of("new"), place_of("nul\0"), place_of("loop")}) == 5
 
 
 def test_a_file_that_appears_while_we_write_is_not_replaced(folder: Path) -> None:

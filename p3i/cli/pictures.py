@@ -67,13 +67,13 @@ class Outputs:
         for path in (picture, facts):
             if path not in (None, "-"):
                 files.check_writable(Path(str(path)), force=given["force"])
-        written = [path for path in (picture, facts) if path is not None and path != "-"]
-        if len(written) == 2 and files.same_place(*written):
-            raise UsageError(f"picture and facts would both be written to {written[0]}")
-        for word in (word for word in inputs if word is not None and word != "-"):
-            for path in written:
-                if files.same_place(word, path):
-                    raise UsageError(f"{path} is read here: write to another file")
+        named = [path for path in (picture, facts) if path is not None and path != "-"]
+        written = {files.place_of(path): path for path in named}
+        if len(written) < len(named):
+            raise UsageError(f"picture and facts would both be written to {named[0]}")
+        taken = {files.place_of(word) for word in inputs if word is not None and word != "-"}
+        if clash := [path for place, path in written.items() if place in taken]:
+            raise UsageError(f"{clash[0]} is read here: write to another file")
         return cls(
             picture=picture,
             kind=kind,

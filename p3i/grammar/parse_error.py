@@ -1,5 +1,8 @@
 """The error that a text with findings is refused by; it can show them, so it stands above report.py."""
 
+from functools import partial
+from typing import Any
+
 from p3i.errors import ProgramError
 from p3i.grammar.diagnostics import Diagnostic
 from p3i.grammar.report import one_line, report_human, report_json
@@ -18,6 +21,10 @@ class ParseError(ProgramError):
         self.source = source
         self.path = path
         super().__init__(diagnostics, source, path)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How it goes to another process, where a photo was searched."""
+        return partial(ParseError, source=self.source, path=self.path), (self.diagnostics,)
 
     def __str__(self) -> str:
         """The first error in one line, and how many more there are."""

@@ -192,8 +192,10 @@ def _is_deep(picture: Pil.Image, data: bytes) -> bool:
     """Whether Pillow would cut the picture down to 8 bits."""
     if picture.format == "PNG":
         return len(data) > 24 and data[24] == 16
-    if picture.format == "TIFF" and data[2:4] in (b"*\0", b"\0*"):  # BigTIFF is left to Pillow
+    if picture.format == "TIFF":
         tags = picture.tag_v2  # pyright: ignore[reportAttributeAccessIssue]
+        if data[2:4] not in (b"*\0", b"\0*") and tags.get(ORIENTATION, 1) != 1:
+            return False  # a turned BigTIFF is left to Pillow: OpenCV would turn it too
         depths = tags.get(258, (1,))
         return max(depths if isinstance(depths, tuple) else (depths,)) > 8 and tags.get(262) in (0, 1, 2)
     return False

@@ -1,11 +1,13 @@
 """Reading: limits, the places of errors, spans and comments."""
 
+import pickle
 import random
 from pathlib import Path
 
 import pytest
 
 import p3i
+from p3i.errors import SketchError
 from p3i.grammar.ast import Affine, Draw, For, If, Polar, Program, Span
 from p3i.grammar.diagnostics import Diagnostic
 from p3i.grammar.parse_error import ParseError
@@ -149,3 +151,12 @@ def test_check_takes_anything(kind: str) -> None:
                 found.span is None or found.span.start <= len(source)
                 for found in p3i.check(source, strict=strict)
             )
+
+
+def test_errors_go_from_process_to_process_with_all_they_hold() -> None:
+    with pytest.raises(ParseError) as raised:
+        p3i.loads("Draw(x=10*i, y=4*j)\n", path="row.p3p")
+    again = pickle.loads(pickle.dumps(raised.value))
+    assert (str(again), again.report()) == (str(raised.value), raised.value.report())
+    sketch = SketchError(place="a.p3p", reason="no", mend="yes")
+    assert vars(pickle.loads(pickle.dumps(sketch))) == vars(sketch)

@@ -98,6 +98,15 @@ def test_a_deep_tiff_is_deflated_as_other_readers_see_it(tmp_path):
         np.testing.assert_array_equal(page.asarray(), np.rint(smooth * 65535))
 
 
+def test_a_deep_tiff_too_large_for_a_plain_one_is_a_big_one_and_read_again(tmp_path, pixels, monkeypatch):
+    monkeypatch.setattr("p3i.vision.tiff._LARGEST_PLAIN", 100)
+    write_image(tmp_path / "a.tif", pixels, bits=16, exif=camera_block().tobytes(), icc=b"123")
+    assert (tmp_path / "a.tif").read_bytes()[:4] == b"II+\0"
+    again = read_image(tmp_path / "a.tif")
+    assert (again.source.bits, again.source.icc) == (16, b"123")
+    np.testing.assert_allclose(again.pixels, pixels, atol=1e-5)
+
+
 def test_a_deep_tiff_needs_no_extra_for_its_pixels(tmp_path, pixels, monkeypatch):
     monkeypatch.setattr("p3i.vision.tiff.has_tifffile", lambda: False)
     alpha = np.linspace(0, 1, 12 * 17, dtype=np.float32).reshape(12, 17)
