@@ -96,6 +96,8 @@ class Value(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):
             return value
+        if value == "":
+            self.fail("it is empty", param, ctx)
         try:
             return self.read(value)
         except (UsageError, ValueError) as error:
@@ -123,6 +125,8 @@ class NumberOrWord(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float | str | None:
+        if value == "":
+            self.fail("it is empty", param, ctx)
         word = str(value).strip().lower()
         if word in self.words:
             return self.words[word]

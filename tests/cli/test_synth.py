@@ -451,8 +451,8 @@ def test_an_empty_folder_and_an_empty_glob_are_3(photo, capsys) -> None:
 
 
 def test_a_photo_comes_through_standard_input(photo, monkeypatch, capsys) -> None:
-    with open(photo("a.png"), "rb") as stream:
-        monkeypatch.setattr(sys, "stdin", types.SimpleNamespace(buffer=stream))
+    with open(photo("a.png"), encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
         assert run(["synth", "-"]) == 0
     printed = capsys.readouterr().out
     assert "SetCameraPose" in printed and "image" not in printed
