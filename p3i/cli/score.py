@@ -52,7 +52,7 @@ def command(
             "equation2": found.equation2,
             "edges": found.edges,
             "score": found.normalised,
-            "features": config.features,
+            "features": config.features_used,
         }
         click.echo(json.dumps(record))
         return

@@ -125,18 +125,21 @@ def walk(session: Session) -> list[Answer]:
     ahead = [one for one in sketches_by_length() if one.family not in covered]
     ahead = [one for one in ahead if asked in ("auto", one.structure)]
     answers: list[Answer] = []
-    for place, one in enumerate(ahead):
-        left = deadline - session.elapsed()
-        if not session.go_on() or left <= 0:
-            break
-        # Each gets an even share of the time that is left: a sketch with many counts takes no other's.
-        limit = dataclasses.replace(session.config, time_s=left / (len(ahead) - place))
-        inner = Session(session.evidence, limit, trace=session.trace)
-        session.tell(f"trying {one.name}", place / len(ahead))
-        found = find_by_sketch(inner, one.sketch, effort=WALKED)[:2]
-        best = max((answer.score for answer in found), default=0.0)
-        session.record("sketch", name=one.name, bits=one.bits, score=best)
-        answers += found
+    with session.until_interrupted():
+        for place, one in enumerate(ahead):
+            left = deadline - session.elapsed()
+            if not session.go_on() or left <= 0:
+                break
+            # Each gets an even share of the time that is left: a sketch with many counts takes no other's.
+            limit = dataclasses.replace(session.config, time_s=left / (len(ahead) - place))
+            inner = Session(session.evidence, limit, trace=session.trace)
+            session.tell(f"trying {one.name}", place / len(ahead))
+            found = find_by_sketch(inner, one.sketch, effort=WALKED)[:2]
+            answers += found
+            if inner.stopped is StopReason.INTERRUPTED:
+                session.stopped = inner.stopped
+            best = max((answer.score for answer in found), default=0.0)
+            session.record("sketch", name=one.name, bits=one.bits, score=best)
     return answers
 
 

@@ -92,12 +92,13 @@ def find_by_sketch(
     starts = [start for answer in known if (start := written_in(every, answer.program)) is not None]
     answers = _answers(session, starts, done=0.0, share=0.0)
     maps: PointMaps | None = None
-    for turn in range(effort.rounds):
-        enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
-        if enough or not session.go_on():
-            break
-        maps = maps or PointMaps.of(session.evidence)
-        answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
+    with session.until_interrupted():
+        for turn in range(effort.rounds):
+            enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
+            if enough or not session.go_on():
+                break
+            maps = maps or PointMaps.of(session.evidence)
+            answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
     return _different(sorted(answers, key=lambda answer: -answer.score))
 
 
@@ -108,29 +109,43 @@ def _searched(
     budget = max(effort.least, effort.points // len(every))
     share = 1 / effort.rounds
     found: list[Found] = []
-    for place, filling in enumerate(every):
-        if found and not session.go_on():
-            break
-        session.tell("looking through the holes", done + share * 0.7 * place / len(every))
-        found += search_grid(session, maps, filling, budget=budget, keep=effort.fits)
-    found = distinct(maps, sorted(found, key=lambda one: -one.score))[: effort.fits]
-    for one in found:
-        session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
+    with session.until_interrupted():
+        for place, filling in enumerate(every):
+            if found and not session.go_on():
+                break
+            session.tell("looking through the holes", done + share * 0.7 * place / len(every))
+            found += search_grid(session, maps, filling, budget=budget, keep=effort.fits)
+    found.sort(key=lambda one: -one.score)
+    found = session.completed(lambda: distinct(maps, found))[: effort.fits]
+    with session.until_interrupted():
+        for one in found:
+            session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
     return _answers(session, found, done=done + share * 0.7, share=share * 0.3)
 
 
 def _answers(session: Session, found: Sequence[Found], *, done: float, share: float) -> list[Answer]:
     """What was found, fitted to its objects; `done` and `share` are parts of the whole search."""
     answers: list[Answer] = []
-    for place, one in enumerate(found):
-        if answers and not session.go_on():
-            break
-        session.tell("fitting to the objects", done + share * place / len(found))
-        fit = _fitted(session, one)
-        if fit is not None:
-            answers.append(_answer(session, fit))
-            session.record("fit", score=answers[-1].score, program=format_program(answers[-1].program))
+    reached = 0
+    with session.until_interrupted():
+        for place, one in enumerate(found):
+            if answers and not session.go_on():
+                break
+            session.tell("fitting to the objects", done + share * place / len(found))
+            reached = place
+            _fit_to_objects(session, one, answers)
+        return answers
+    if not answers and found:  # the one that was begun is worth the wait
+        _fit_to_objects(session, found[reached], answers)
     return answers
+
+
+def _fit_to_objects(session: Session, found: Found, answers: list[Answer]) -> None:
+    """Fit what was found in the grid; its answer, if it has one, goes into `answers`."""
+    fit = _fitted(session, found)
+    if fit is not None:
+        answers.append(_answer(session, fit))
+        session.record("fit", score=answers[-1].score, program=format_program(answers[-1].program))
 
 
 def most_drawn(sketch: Sketch) -> int:

@@ -21,7 +21,7 @@ def test_the_names_of_features_are_those_of_the_extractors() -> None:
     from p3i.vision.features import DEFAULT, EXTRACTORS
 
     assert tuple(EXTRACTORS) == FEATURES
-    assert default("features") == DEFAULT
+    assert SearchConfig().features_used == DEFAULT
 
 
 def test_features_may_be_joined() -> None:
