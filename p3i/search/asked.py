@@ -5,11 +5,10 @@ import math
 from collections.abc import Callable
 
 from p3i.errors import SketchError
-from p3i.grammar.ast import Header
-from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.ast import Header, Program
 from p3i.grammar.leaves import with_leaves
-from p3i.grammar.printer import format_program
-from p3i.grammar.sketch import Sketch
+from p3i.grammar.sketch import Hole, Sketch
+from p3i.grammar.strict import departures
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
@@ -35,7 +34,7 @@ def asked_for(config: SearchConfig) -> Callable[[Session], list[Answer]] | None:
     if config.recipe == "paper":
         return find_by_paper
     if config.start is not None:
-        start = whole_program_sketch(config.start)
+        start = whole_program_sketch(config.start, table1=config.strict)
         return lambda session: find_by_sketch(session, start)
     sketch = config.sketch
     if sketch is None:
@@ -95,18 +94,23 @@ def check_asked(config: SearchConfig, size: Size) -> None:
                 reason=f"its canvas is {wide} x {tall}, and the photo is {size.width} x {size.height}",
                 mend="give the photo that it was written for, or take `canvas` out of its header",
             )
-    sketch = config.sketch or (whole_program_sketch(config.start) if config.start is not None else None)
+    if header is not None and header.lens_k1 is not None:
+        raise SketchError(
+            place=name,
+            reason=f"its header has a lens (lens_k1 = {header.lens_k1:g}), and no lens is fitted here",
+            mend="take `lens_k1` out of its header",
+        )
+    sketch = config.sketch
+    if config.start is not None:
+        sketch = whole_program_sketch(config.start, table1=config.strict)
     if sketch is None:
         return
-    if config.strict:
-        try:
-            format_program(dataclasses.replace(sketch.template, header=None), layout="table1")
-        except ParseError as outside:
-            raise SketchError(
-                place=name,
-                reason=f"it leaves Table 1: {outside.diagnostics[0].message}",
-                mend="keep to Table 1, or leave out --strict",
-            ) from None
+    if config.strict and (left := departures(_filled_with_something(sketch))):
+        raise SketchError(
+            place=name,
+            reason=f"it leaves Table 1: {left[0].message}",
+            mend="keep to Table 1, or leave out --strict",
+        )
     drawn = most_drawn(sketch)
     if drawn < _FEWEST_OBJECTS:
         raise SketchError(
@@ -114,6 +118,16 @@ def check_asked(config: SearchConfig, size: Size) -> None:
             reason=f"it draws {drawn} objects at most, too few to fix camera and pattern",
             mend=f"let its loops draw {_FEWEST_OBJECTS} or more",
         )
+
+
+def _filled_with_something(sketch: Sketch) -> Program:
+    """The sketch with a number other than 0 in each hole that may hold one: 0 is written anywhere."""
+
+    def some(hole: Hole) -> float:
+        limits = [limit for limit in (hole.start, hole.lower, hole.upper) if limit is not None]
+        return next((limit for limit in limits if limit != 0), 0.0 if hole.lower == hole.upper == 0 else 1.0)
+
+    return with_leaves(sketch.template, {hole.path: hole.leaf(some(hole)) for hole in sketch.holes})
 
 
 def walk(session: Session) -> list[Answer]:

@@ -20,6 +20,7 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.sketch import Hole, Sketch, parse_sketch
+from p3i.grammar.strict import departures
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import edges, live_indices, nest
@@ -260,11 +261,12 @@ def start_values(filling: Filling) -> Tensor | None:
     return torch.tensor([unknown.start for unknown in filling.moving], dtype=torch.float64)
 
 
-def whole_program_sketch(program: Program) -> Sketch:
+def whole_program_sketch(program: Program, *, table1: bool = False) -> Sketch:
     """A program as a sketch that starts at its own numbers: camera and `Draw` free, bounds and guards kept.
 
     What x and y of a curve share (the radius and the angle of a circle) stays one number, and a ring does not
-    become a spiral: loop coefficients that are zero inside Cos, Sin and their radius stay zero.
+    become a spiral: loop coefficients that are zero inside Cos, Sin and their radius stay zero. With `table1`
+    so do all numbers that Table 1 has no place for.
     """
     parts = nest(program)
     bound = {"1"} | ({"i"} if parts.for_i else set()) | ({"j"} if parts.for_j else set())
@@ -278,6 +280,8 @@ def whole_program_sketch(program: Program) -> Sketch:
             continue
         inner = kind.endswith((".radius", ".angle", ".offset"))
         if inner and variable != "1" and value == 0:
+            continue
+        if table1 and value == 0 and departures(with_leaves(program, {path: 1.0})):
             continue
         pair = path.removeprefix("draw.x.").removeprefix("draw.y.")
         shared = values.get(f"draw.x.{pair}") == values.get(f"draw.y.{pair}")

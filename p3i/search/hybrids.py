@@ -54,12 +54,12 @@ def find_hybrids(session: Session) -> list[Answer]:
     for _, score, fit in found:
         if len(answers) >= _MOST_TOLD:
             break
-        answer = answer_of(session, fit, "hybrid", score)
+        free = answer_of(session, fit, "hybrid", score)
+        answer = session.completed(partial(_without_empty_middle, session, free))
         if session.config.strict:
-            told = session.completed(partial(hybrid_in_table1, session, fit, answer))
+            answers += session.completed(partial(hybrid_in_table1, session, fit, answer))
         else:
-            told = [answer]
-        answers += [session.completed(partial(_without_empty_middle, session, one)) for one in told]
+            answers.append(answer)
     return answers
 
 

@@ -42,15 +42,12 @@ def unwritable_note(session: Session) -> str:
 def ring_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answer]:
     """The ring or arc of a fit with phase 0; empty where too few of its objects are in sight then.
 
-    Angles are counted from 0 in steps: a closed ring turns by up to half a step, and an arc begins at the
-    nearest multiple of its step, which gives a little.
+    Angles are counted from 0 in steps, so the objects move along the circle by up to half a step.
     """
     values, drawn = values_of(fit), len(fit.filling.pattern.index)
     step, first = values.get("draw.x.angle.j"), 0
     if step is not None:
-        phase = values["draw.x.angle.1"] % 360
-        first = round(phase / step)
-        values["draw.x.angle.j"] = _slope(np.arange(drawn) + first, phase + step * np.arange(drawn))
+        first = round(values["draw.x.angle.1"] % 360 / step)
     angle = f"360/{drawn}*j" if step is None else "?s*j"
     text = (
         "SetCameraPose(rx=??, ry=??)\n"
@@ -82,8 +79,6 @@ def hybrid_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answ
         return _unwritable(session, free)
     # Rings are counted from the centre; those of a fan have so many objects as their number says.
     shift = 0 if fan else max(round(values["draw.x.radius.1"] / growth), 1 - first)
-    own = np.arange(first, stop)
-    values["draw.x.radius.i"] = _slope(own + shift, values["draw.x.radius.1"] + growth * own)
     angle, last = ("?s*j", f"{count}*i") if fan else (f"360/{count}*j", str(count))
     text = (
         "SetCameraPose(rx=??, ry=??)\n"
@@ -123,11 +118,6 @@ def _fitted(
     away = _median_px(session, answer, free)
     note = f"Table 1 has no phase: the objects lie {away:.1f} pixels from the free fit"
     return [replace(answer, notes=(*free.notes, note))]
-
-
-def _slope(index: np.ndarray, wanted: np.ndarray) -> float:
-    """The factor by which whole numbers [N] come closest to what is wanted [N]."""
-    return float(index @ wanted) / max(float(index @ index), 1e-9)
 
 
 def _median_px(session: Session, answer: Answer, free: Answer) -> float:
