@@ -1,4 +1,4 @@
-"""Searches that have found a ring already, for what starts from rings: how one is found is tested elsewhere."""
+"""Searches that have found a ring already, for what starts from rings."""
 
 from p3i.evaluation.scene import Scene
 from p3i.grammar.leaves import leaves

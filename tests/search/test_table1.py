@@ -1,4 +1,4 @@
-"""Answers within Table 1: every program that comes back under strict is a string of it, and the note is true."""
+"""Answers within Table 1: every program found under strict is a string of it, and the note is true."""
 
 from dataclasses import replace
 
@@ -22,7 +22,6 @@ from p3i.search.result import StopReason, SynthesisResult
 from p3i.search.session import Answer
 from p3i.search.sketches import Family
 from p3i.search.synthesize import synthesize
-from p3i.vision.image import Image
 
 ON_PHASE = DrawnRing(first_deg=0.0)
 """A ring that Table 1 can say exactly."""
@@ -31,7 +30,7 @@ ARC = DrawnRing(count=9, slots=14, first_deg=60.0)
 
 
 def is_in_table1(result: SynthesisResult) -> None:
-    """Every candidate, printed in the table's layout, is read by the table's own grammar as the same program."""
+    """Every candidate, printed in the table's layout, reads back by the table's own grammar."""
     assert result.program is not None, result.reason
     assert result.candidates[0].program == result.program
     for candidate in result.candidates:
@@ -138,7 +137,7 @@ def sketch(text: str) -> Sketch:
 
 @pytest.mark.parametrize("hole", [" + ??(-5, 5)", " + ~0", " + ??"])
 def test_a_strict_sketch_with_a_hole_that_table_1_lacks_is_refused_whatever_its_middle(hole: str) -> None:
-    image = Image(small_scene(14).pixels, np.ones(small_scene(14).pixels.shape[:2], bool))
+    image = small_scene(14).image()
     with pytest.raises(SketchError, match="leaves Table 1"):
         synthesize(image, SearchConfig(strict=True, sketch=sketch(LATTICE.format(x=hole))))
 
