@@ -120,8 +120,8 @@ def _fits(session: Session, ring: CurveFit, proposals: list[HybridProposal]) -> 
         with session.until_interrupted():
             _grow(session, grown, proposal)
         fit = grown[-1]
-        session.record("hybrid", program=fit.filling.program(fit.z, ()), score=fit.quality)
         yield fit
+        session.record("hybrid", program=fit.filling.program(fit.z, ()), score=fit.quality)
 
 
 def _same(first: BaseRing, second: BaseRing) -> bool:
