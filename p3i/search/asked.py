@@ -13,11 +13,12 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
 from p3i.search.enumerate import sketches_by_length
-from p3i.search.fill import whole_program_sketch
+from p3i.search.fill import draws, whole_program_sketch
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
 from p3i.search.session import Answer, Session
-from p3i.search.sketched import WALKED, find_by_sketch, most_drawn, structure_of
+from p3i.search.settings import check_settings
+from p3i.search.sketched import WALKED, find_by_sketch, structure_of
 from p3i.search.sketches import FAMILIES
 from p3i.size import Size
 
@@ -111,8 +112,13 @@ def check_asked(config: SearchConfig, size: Size) -> None:
             reason=f"it leaves Table 1: {left[0].message}",
             mend="keep to Table 1, or leave out --strict",
         )
-    drawn = most_drawn(sketch)
-    if drawn < _FEWEST_OBJECTS:
+    check_settings(sketch, place=name)
+    drawn = 0
+    for drawn_here in draws(sketch):
+        drawn = max(drawn, drawn_here)
+        if drawn >= _FEWEST_OBJECTS:
+            break
+    else:
         raise SketchError(
             place=name,
             reason=f"it draws {drawn} objects at most, too few to fix camera and pattern",

@@ -23,7 +23,6 @@ from p3i.search.coarse import PointMaps, kept_within
 from p3i.search.curves import CurveFit, follow, measured
 from p3i.search.fill import (
     Filling,
-    all_settings,
     fillings,
     pinned,
     unknowns_of,
@@ -33,6 +32,8 @@ from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
 from p3i.search.score import normalised_score
 from p3i.search.session import Answer, Session
+from p3i.search.settings import best_setting, widened
+from p3i.search.thinned import thinned
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +55,8 @@ WALKED = Effort(24_000, 600, 4, 1)
 _ENOUGH = 0.35
 # Objects that a sketch may draw in the coarse search, and settings of its extents there.
 _MOST_INDICES, _MOST_SETTINGS = 64, 8
-# Settings of the extents that are weighed in the end.
-_ALL_SETTINGS = 4000
+# Of more objects in sight than this, so many say which are there.
+_MOST_WEIGHED = 2000
 # Rounds of registration.
 _ROUNDS, _LAST_ROUNDS = 3, 5
 # A pattern that was caught by its middle may grow by an object as often as this.
@@ -148,12 +149,6 @@ def _fit_to_objects(session: Session, found: Found, answers: list[Answer]) -> No
         session.record("fit", score=answers[-1].score, program=format_program(answers[-1].program))
 
 
-def most_drawn(sketch: Sketch) -> int:
-    """The most objects that a filling of the sketch can draw."""
-    every = fillings(sketch, unknowns_of(sketch), most_indices=10**6, most_settings=_MOST_SETTINGS)
-    return max((int(filling.masks.sum(1).max()) for filling in every), default=0)
-
-
 def _fitted(session: Session, found: Found) -> _Fit | None:
     """A filling fitted to its objects, its extents chosen anew."""
     setting = found.filling.settings[found.setting]
@@ -162,10 +157,9 @@ def _fitted(session: Session, found: Found) -> _Fit | None:
     if now is None:
         return None
     now = _on_objects(session, now)
-    settings = all_settings(filling, most=_ALL_SETTINGS)
-    wide = with_settings(filling, settings)
+    wide = widened(filling)
     for _ in range(_EXTENTS_TRIED):
-        chosen = _best_extent(session, wide, now)
+        chosen = _best_extent(session, wide, now, setting)
         if chosen is None or (chosen[1] == setting and torch.equal(chosen[0], now.z)):
             break
         z, setting = chosen
@@ -225,7 +219,9 @@ def _centred(session: Session, fit: CurveFit) -> CurveFit:
     return again if again is not None and again.mean > 0.8 * fit.mean else fit
 
 
-def _best_extent(session: Session, wide: Filling, now: CurveFit) -> tuple[Tensor, tuple[int, ...]] | None:
+def _best_extent(
+    session: Session, wide: Filling, now: CurveFit, setting: tuple[int, ...]
+) -> tuple[Tensor, tuple[int, ...]] | None:
     """Which objects are there: the setting of the extents that draws most of them and little else.
 
     Where the sketch's numbers allow, its indices are also counted from one object earlier or later.
@@ -236,10 +232,10 @@ def _best_extent(session: Session, wide: Filling, now: CurveFit) -> tuple[Tensor
         z = now.z if shift == (0, 0) else _shifted(wide, now.z, shift)
         if z is None:
             continue
-        gain = wide.masks.double() @ _gains(session, wide, z, side=now.side, typical=typical)
-        value, place = gain.max(0)
-        if best is None or float(value) > best[0] + 0.5 * typical * (shift != (0, 0)):
-            best = (float(value), z, wide.settings[int(place)])
+        gains = _gains(session, wide, z, side=now.side, typical=typical)
+        value, chosen = best_setting(wide, gains, setting)
+        if best is None or value > best[0] + 0.5 * typical * (shift != (0, 0)):
+            best = value, z, chosen
     return None if best is None else best[1:]
 
 
@@ -250,9 +246,11 @@ def _gains(session: Session, wide: Filling, z: Tensor, *, side: float, typical: 
     seen = evidence.in_sight(wide.pattern, theta)
     gains = torch.full((len(seen),), -0.02 * typical, dtype=torch.float64)
     if int(seen.sum()) >= 3:
-        index = wide.pattern.index[seen].double()
+        at = torch.nonzero(seen)[:, 0]
+        at = at[thinned(wide.pattern.index[at], _MOST_WEIGHED)]
+        index = wide.pattern.index[at].double()
         found = patch_contrast(evidence, wide.pattern, theta, index, side=side, focal_mm=evidence.focal_mm)
-        gains[seen] = found.contrast.double() - _PRESENT * typical
+        gains[at] = found.contrast.double() - _PRESENT * typical
     return gains
 
 
