@@ -31,7 +31,6 @@ class Sketched:
     structure: StructureFound
     sketch: Sketch
     bits: float
-    in_table1: bool
     family: StructureFound | None
 
 
@@ -115,4 +114,4 @@ def _made(
     bits += 0.0 if form.table1 else _BITS_BEYOND
     name = f"{form.name}, {guards} guard" if guards else form.name
     family = None if form.name.startswith(("row", "spiral")) else structure
-    return Sketched(name, structure, sketch, bits, form.table1, family)
+    return Sketched(name, structure, sketch, bits, family)

@@ -121,10 +121,10 @@ def unknowns_of(sketch: Sketch, *, longer_units: tuple[float, float] = (100.0, 1
     families: dict[str, list[Hole]] = {}
     for hole in sketch.holes:
         families.setdefault(f"?{hole.name}" if hole.name is not None else hole.path, []).append(hole)
-    return [_unknown(holes, sketch, longer_units) for holes in families.values()]
+    return [_unknown(holes, longer_units) for holes in families.values()]
 
 
-def _unknown(holes: list[Hole], sketch: Sketch, canvas: tuple[float, float]) -> Unknown:
+def _unknown(holes: list[Hole], canvas: tuple[float, float]) -> Unknown:
     first = holes[0]
     paths = tuple(hole.path for hole in holes)
     # Guards are discrete, so their numbers are searched among whole ones.

@@ -74,7 +74,6 @@ class _Fit:
 
     curve: CurveFit
     setting: tuple[int, ...]
-    worth: float
 
 
 def find_by_sketch(
@@ -170,7 +169,7 @@ def _fitted(session: Session, found: Found) -> _Fit | None:
     last = _followed(session, now.filling, now.z, rounds=_LAST_ROUNDS)
     best = last if last is not None and last.mean >= now.mean else now
     best = _centred(session, best)
-    return _Fit(best, setting, best.mean)
+    return _Fit(best, setting)
 
 
 def _followed(session: Session, filling: Filling, z: Tensor, *, rounds: int) -> CurveFit | None:
