@@ -36,7 +36,7 @@ class Sketched:
 
 @dataclass(frozen=True, slots=True)
 class _Form:
-    """A form of `Draw`: its name, its x and y, the loops it needs, and whether Table 1 has it."""
+    """A form of `Draw`: its name, its x and y, and whether Table 1 has it, however it spells a count."""
 
     name: str
     x: str
