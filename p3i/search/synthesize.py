@@ -88,6 +88,8 @@ def _result(
     margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(session, first)
     notes = first.notes if other is None else (*first.notes, ambiguity_note(other))
+    if config.extent_used == "image" and first.structure != "lattice":
+        notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
     if session.unwritable - {first.structure}:
         notes = (*notes, unwritable_note(session))
     session.tell("done", 1.0)
