@@ -53,7 +53,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
             ),
             focal_mm=31.5,
             focal_source="exif",
-            features=config.features,
+            features=config.features_used,
             seed=config.seed,
             notes=("of the search",),
         )

@@ -46,7 +46,7 @@ def command(image: str, program: str, form: str, error_format: str, **given: Any
             "equation2": found.equation2,
             "edges": found.edges,
             "score": found.normalised,
-            "features": config.features,
+            "features": config.features_used,
         }
         click.echo(json.dumps(record))
         return

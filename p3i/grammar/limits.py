@@ -31,5 +31,8 @@ SOURCE = Limit("P3I_MAX_SOURCE", 100_000)
 NESTING = Limit("P3I_MAX_NESTING", 100, ceiling=200)
 """Brackets inside one another; likewise loops and guards above a draw. Python's stack sets the ceiling."""
 
+SETTINGS = Limit("P3I_MAX_SETTINGS", 4000)
+"""Numbers that one whole hole of a sketch may be, and ways to choose those in `Draw`: each is looked at."""
+
 DRAWS = Limit("P3I_MAX_DRAWS", 1_000_000)
 """Turns of a program's loops, counted before guards."""

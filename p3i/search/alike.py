@@ -34,15 +34,14 @@ class Kind:
 
     template: Floats
     weights: Floats
-    level: float
 
 
 @dataclass(frozen=True, slots=True)
 class Alike:
     """The cells of a photo and their common cell, one entry a cell of `sheet.box`, row by row.
 
-    `template` [C, side, side] is the mean feature cell, `fit` [N] each cell's agreement with it, `weights`
-    [N] in 0..1 how far it is taken for a part of the pattern, `level` the agreement of a typical one.
+    `template` [C, side, side] is the mean feature cell, `weights` [N] in 0..1 how far each cell is taken for
+    a part of the pattern, `level` the agreement of a typical one with the template.
     `second` is the other kind of cell that the pattern holds, if it does (stones on a board's lines).
     `colour_share` in 0..1 says how well colours repeat (0 where neighbours swap them, as on a chessboard
     read square by square).
@@ -55,7 +54,6 @@ class Alike:
     cells: Floats
     cells_known: Mask
     template: Floats
-    fit: Floats
     weights: Floats
     level: float
     second: Kind | None
@@ -69,7 +67,7 @@ class Alike:
     @property
     def kinds(self) -> tuple[Kind, ...]:
         """The one or two kinds of cell, the common one first."""
-        first = Kind(self.template, self.weights, self.level)
+        first = Kind(self.template, self.weights)
         return (first,) if self.second is None else (first, self.second)
 
 
@@ -131,7 +129,6 @@ def look_alike(
         cells,
         cells_known,
         template,
-        fit,
         weights,
         level,
         second,
@@ -202,8 +199,7 @@ def _second_kind(
     common = weighted_mean(cells, known, weights)
     if (template[GRADIENT] ** 2).sum() < _LEAST_ENERGY * (common[GRADIENT] ** 2).sum():
         return None  # places that are alike because they are all empty
-    level = float(np.average(agreement(cells[gaps], some_known, template[None])[:, 0], weights=chosen))
-    return Kind(template, all_weights, level)
+    return Kind(template, all_weights)
 
 
 def between(passes: Mask) -> Mask:

@@ -5,21 +5,21 @@ import math
 from collections.abc import Callable
 
 from p3i.errors import SketchError
-from p3i.grammar.ast import Header
+from p3i.grammar.ast import Header, Program
+from p3i.grammar.departures import departures
 from p3i.grammar.leaves import with_leaves
-from p3i.grammar.parse_error import ParseError
-from p3i.grammar.printer import format_program
-from p3i.grammar.sketch import Sketch
+from p3i.grammar.sketch import Hole, Sketch
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.enumerate import sketches_by_length
-from p3i.search.fill import whole_program_sketch
+from p3i.search.fill import draws, whole_program_sketch
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
 from p3i.search.session import Session
-from p3i.search.sketched import WALKED, find_by_sketch, most_drawn, structure_of
+from p3i.search.settings import check_settings
+from p3i.search.sketched import WALKED, find_by_sketch, structure_of
 from p3i.search.sketches import FAMILIES
 from p3i.size import Size
 
@@ -36,7 +36,7 @@ def asked_for(config: SearchConfig) -> Callable[[Session], list[Answer]] | None:
     if config.recipe == "paper":
         return find_by_paper
     if config.start is not None:
-        start = whole_program_sketch(config.start)
+        start = whole_program_sketch(config.start, table1=config.strict)
         return lambda session: find_by_sketch(session, start)
     sketch = config.sketch
     if sketch is None:
@@ -96,25 +96,45 @@ def check_asked(config: SearchConfig, size: Size) -> None:
                 reason=f"its canvas is {wide} x {tall}, and the photo is {size.width} x {size.height}",
                 mend="give the photo that it was written for, or take `canvas` out of its header",
             )
-    sketch = config.sketch or (whole_program_sketch(config.start) if config.start is not None else None)
+    if header is not None and header.lens_k1 is not None:
+        raise SketchError(
+            place=name,
+            reason=f"its header has a lens (lens_k1 = {header.lens_k1:g}), and no lens is fitted here",
+            mend="take `lens_k1` out of its header",
+        )
+    sketch = config.sketch
+    if config.start is not None:
+        sketch = whole_program_sketch(config.start, table1=config.strict)
     if sketch is None:
         return
-    if config.strict:
-        try:
-            format_program(dataclasses.replace(sketch.template, header=None), layout="table1")
-        except ParseError as outside:
-            raise SketchError(
-                place=name,
-                reason=f"it leaves Table 1: {outside.diagnostics[0].message}",
-                mend="keep to Table 1, or leave out --strict",
-            ) from None
-    drawn = most_drawn(sketch)
-    if drawn < _FEWEST_OBJECTS:
+    if config.strict and (left := departures(_filled_with_something(sketch))):
+        raise SketchError(
+            place=name,
+            reason=f"it leaves Table 1: {left[0].message}",
+            mend="keep to Table 1, or leave out --strict",
+        )
+    check_settings(sketch, place=name)
+    drawn = 0
+    for drawn_here in draws(sketch):
+        drawn = max(drawn, drawn_here)
+        if drawn >= _FEWEST_OBJECTS:
+            break
+    else:
         raise SketchError(
             place=name,
             reason=f"it draws {drawn} objects at most, too few to fix camera and pattern",
             mend=f"let its loops draw {_FEWEST_OBJECTS} or more",
         )
+
+
+def _filled_with_something(sketch: Sketch) -> Program:
+    """The sketch with a number other than 0 in each hole that may hold one: 0 is written anywhere."""
+
+    def some(hole: Hole) -> float:
+        limits = [limit for limit in (hole.start, hole.lower, hole.upper) if limit is not None]
+        return next((limit for limit in limits if limit != 0), 0.0 if hole.lower == hole.upper == 0 else 1.0)
+
+    return with_leaves(sketch.template, {hole.path: hole.leaf(some(hole)) for hole in sketch.holes})
 
 
 def walk(session: Session) -> list[Answer]:
@@ -126,18 +146,21 @@ def walk(session: Session) -> list[Answer]:
     ahead = [one for one in sketches_by_length() if one.family not in covered]
     ahead = [one for one in ahead if asked in ("auto", one.structure)]
     answers: list[Answer] = []
-    for place, one in enumerate(ahead):
-        left = deadline - session.elapsed()
-        if not session.go_on() or left <= 0:
-            break
-        # Each gets an even share of the time that is left: a sketch with many counts takes no other's.
-        limit = dataclasses.replace(session.config, time_s=left / (len(ahead) - place))
-        inner = Session(session.evidence, limit, trace=session.trace)
-        session.tell(f"trying {one.name}", place / len(ahead))
-        found = find_by_sketch(inner, one.sketch, effort=WALKED)[:2]
-        best = max((answer.score for answer in found), default=0.0)
-        session.record("sketch", name=one.name, bits=one.bits, score=best)
-        answers += found
+    with session.until_interrupted():
+        for place, one in enumerate(ahead):
+            left = deadline - session.elapsed()
+            if not session.go_on() or left <= 0:
+                break
+            # Each gets an even share of the time that is left: a sketch with many counts takes no other's.
+            limit = dataclasses.replace(session.config, time_s=left / (len(ahead) - place))
+            inner = Session(session.evidence, limit, trace=session.trace)
+            session.tell(f"trying {one.name}", place / len(ahead))
+            found = find_by_sketch(inner, one.sketch, effort=WALKED)[:2]
+            answers += found
+            if inner.stopped is StopReason.INTERRUPTED:
+                session.stopped = inner.stopped
+            best = max((answer.score for answer in found), default=0.0)
+            session.record("sketch", name=one.name, bits=one.bits, score=best)
     return answers
 
 

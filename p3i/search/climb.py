@@ -71,22 +71,29 @@ def search_grid(
     score = score * distinct_share(filling, z)
     z, score = _climbed(session, maps, filling, z, score)
     z, score = _best(z, score, 4 * keep)
-    z = _descended(maps, filling, z)
+    with session.until_interrupted():
+        z = _descended(maps, filling, z)
+    return session.completed(lambda: _found(maps, filling, z))[:keep]
+
+
+def _found(maps: PointMaps, filling: Filling, z: Tensor) -> list[Found]:
+    """The numbers z [K, F], each with its best setting, that draw at different places, the best first."""
     table = score_points(maps, filling, z, share=BLUR_SHARES[-1]) * distinct_share(filling, z)[:, None]
     score, setting = table.max(1)
     found = [Found(filling, *row) for row in zip(z, setting.tolist(), score.tolist(), strict=True)]
-    return distinct(maps, sorted(found, key=lambda one: -one.score))[:keep]
+    return distinct(maps, sorted(found, key=lambda one: -one.score))
 
 
 def _scored(session: Session, maps: PointMaps, filling: Filling, z: Tensor, *, share: float) -> Tensor:
     """The score of each filling's best setting, [B]; 0 for those that time did not reach."""
     found = torch.zeros(len(z))
     size = max(16, _MOST_POINTS // (9 * len(filling.pattern.index)))
-    for first in range(0, len(z), size):
-        if not session.go_on():
-            break
-        part = z[first : first + size]
-        found[first : first + size] = score_points(maps, filling, part, share=share, soft=True).amax(1)
+    with session.until_interrupted():
+        for first in range(0, len(z), size):
+            if not session.go_on():
+                break
+            part = z[first : first + size]
+            found[first : first + size] = score_points(maps, filling, part, share=share, soft=True).amax(1)
     return found
 
 
@@ -101,30 +108,33 @@ def _climbed(
     """Survivors [K, F] moved by seeded steps to better places; the worse half falls away now and then."""
     width = filling.width
     share = BLUR_SHARES[0]
-    for turn in range(_ROUNDS):
-        if not session.go_on():
-            break
-        done = turn / (_ROUNDS - 1)
-        reach = _FIRST_REACH * (_LAST_REACH / _FIRST_REACH) ** done
-        level = BLUR_SHARES[min(len(BLUR_SHARES) - 1, int(done * len(BLUR_SHARES)))]
-        if level != share:
-            share = level
-            score = _scored(session, maps, filling, z, share=share) * distinct_share(filling, z)
-            z, score = _best(z, score, max(24, len(z) // 2))
-        shape = (len(z), _TRIES, len(width))
-        steps = torch.randn(shape, generator=session.generator, dtype=torch.float64)
-        # A step along few numbers goes further than one along all.
-        chosen = torch.rand(shape, generator=session.generator) < 0.5
-        tries = kept_within(filling, z[:, None] + reach * width * steps * chosen)
-        flat = tries.flatten(0, 1)
-        value = _scored(session, maps, filling, flat, share=share)
-        value = (value * distinct_share(filling, flat)).reshape(len(z), _TRIES)
-        top, place = value.max(1)
-        better = top > score
-        z = torch.where(better[:, None], tries[torch.arange(len(z)), place], z)
-        score = torch.where(better, top, score)
-        if turn % 3 == 2:
-            z, score = _best(z, score, max(24, len(z) // 2))
+    with session.until_interrupted():
+        for turn in range(_ROUNDS):
+            if not session.go_on():
+                break
+            done = turn / (_ROUNDS - 1)
+            reach = _FIRST_REACH * (_LAST_REACH / _FIRST_REACH) ** done
+            level = BLUR_SHARES[min(len(BLUR_SHARES) - 1, int(done * len(BLUR_SHARES)))]
+            if level != share:
+                share = level
+                again = _scored(session, maps, filling, z, share=share) * distinct_share(filling, z)
+                if not session.go_on():
+                    break  # not all were scored again: those of before are as good
+                z, score = _best(z, again, max(24, len(z) // 2))
+            shape = (len(z), _TRIES, len(width))
+            steps = torch.randn(shape, generator=session.generator, dtype=torch.float64)
+            # A step along few numbers goes further than one along all.
+            chosen = torch.rand(shape, generator=session.generator) < 0.5
+            tries = kept_within(filling, z[:, None] + reach * width * steps * chosen)
+            flat = tries.flatten(0, 1)
+            value = _scored(session, maps, filling, flat, share=share)
+            value = (value * distinct_share(filling, flat)).reshape(len(z), _TRIES)
+            top, place = value.max(1)
+            better = top > score
+            moved = torch.where(better[:, None], tries[torch.arange(len(z)), place], z)
+            z, score = moved, torch.where(better, top, score)
+            if turn % 3 == 2:
+                z, score = _best(z, score, max(24, len(z) // 2))
     return z, score
 
 

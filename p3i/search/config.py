@@ -11,7 +11,7 @@ from typing import Annotated, Literal, get_args
 from p3i.errors import SketchError, UsageError
 from p3i.grammar.ast import Program
 from p3i.grammar.sketch import Sketch
-from p3i.records import Spelt, check_focal, told
+from p3i.records import Spelt, check_focal
 
 Structure = Literal["auto", "lattice", "circular", "hybrid"]
 Extent = Literal["found", "image"]
@@ -37,10 +37,11 @@ class SearchConfig:
 
     structure: Annotated[Structure, "The kind of pattern to look for; auto tries all kinds."] = "auto"
     features: Annotated[
-        str,
-        f"What parts of the photo are compared by: {', '.join(FEATURES)}, or several joined by +.",
+        str | None,
+        f"What parts of the photo are compared by: {', '.join(FEATURES)}, or several joined by +. "
+        f"By default {FEATURES[0]}; with --recipe paper alexnet if there are --weights, else rgb.",
         Spelt(metavar="NAME"),
-    ] = "oriented"
+    ] = None
     weights: Annotated[Path | None, "A file with the weights of the features (alexnet needs one)."] = None
     focal_mm: Annotated[
         float | Literal["auto"] | None,
@@ -54,8 +55,10 @@ class SearchConfig:
         Spelt(metavar="K1|auto|none", none="none"),
     ] = None
     extent: Annotated[
-        Extent, "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
-    ] = "found"
+        Extent | None,
+        "Draw the objects that were found, or let a lattice fill the whole image, as in the paper. "
+        "By default found; with --recipe paper image.",
+    ] = None
     sketch: Annotated[
         Sketch | None,
         "A program with holes to fill (??, ?name, ~start), instead of a search.",
@@ -69,7 +72,7 @@ class SearchConfig:
     recipe: Annotated[
         Recipe,
         "How to search: p3i, or paper for the paper's own way, for comparison: equation 2 as printed, "
-        "a grid of 2 units, gradient descent, features alexnet (with --weights) or else rgb, --extent image.",
+        "a grid of 2 units, gradient descent, and its own features and extent.",
     ] = "p3i"
     exhaustive_s: Annotated[
         float | None,
@@ -88,15 +91,11 @@ class SearchConfig:
 
     def __post_init__(self) -> None:
         _one_of("structure", self.structure, STRUCTURES)
-        if self.recipe == "paper":  # one configuration, whole
-            _, default = told(SearchConfig)
-            if self.features == default("features"):
-                object.__setattr__(self, "features", "rgb" if self.weights is None else "alexnet")
-            object.__setattr__(self, "extent", "image")
-        parts = [part.strip() for part in self.features.split("+")]
+        _one_of("recipe", self.recipe, RECIPES)
+        parts = [part.strip() for part in self.features_used.split("+")]
         for part in parts:
             _one_of("features", part, FEATURES)
-        _one_of("extent", self.extent, EXTENTS)
+        _one_of("extent", self.extent_used, EXTENTS)
         self._check_asked()
         if isinstance(self.focal_mm, str):
             _one_of("the focal length, where no number,", self.focal_mm, ("auto",))
@@ -117,9 +116,25 @@ class SearchConfig:
         if ("alexnet" in parts) != (self.weights is not None):
             raise UsageError("the features alexnet, and only they, need a file with weights (--weights FILE)")
 
+    @property
+    def features_used(self) -> str:
+        """The features that were asked for, else those of the recipe."""
+        if self.features is not None:
+            return self.features
+        if self.recipe == "paper":
+            return "rgb" if self.weights is None else "alexnet"
+        return FEATURES[0]
+
+    @property
+    def extent_used(self) -> Extent:
+        """The extent that was asked for, else that of the recipe."""
+        return self.extent or ("image" if self.recipe == "paper" else "found")
+
     def _check_asked(self) -> None:
-        """What says how to search: a sketch, a start, a recipe, or nothing."""
-        _one_of("recipe", self.recipe, RECIPES)
+        """What says how to search: a sketch, a start, a recipe, or nothing.
+
+        No option is overruled or left unread in silence: what cannot be honoured beside it is refused.
+        """
         asked = [name for name in ("sketch", "start") if getattr(self, name) is not None]
         asked += ["recipe paper"] if self.recipe == "paper" else []
         asked += ["exhaustive"] if self.exhaustive_s is not None else []
@@ -130,11 +145,27 @@ class SearchConfig:
             raise SketchError(place="the sketch", reason="nothing in it is left to be found", mend=mend)
         if self.exhaustive_s is not None and not self.exhaustive_s > 0:
             raise UsageError(f"the time must be more than 0 seconds, not {self.exhaustive_s:g}")
+        how = asked[0] if asked else ""
         alone = {"sketch": ("auto",), "start": ("auto",), "recipe paper": ("auto", "lattice")}
-        if asked and self.structure not in alone.get(asked[0], STRUCTURES):
-            raise UsageError(f"--{asked[0]} and --structure {self.structure} contradict each other")
-        if asked and asked[0] in ("sketch", "start") and self.extent == "image":
-            raise UsageError(f"--{asked[0]} says itself which objects are drawn: leave out --extent image")
+        # Rows and spirals are what no family looks for.
+        alone |= {"exhaustive": ("auto", "lattice", "circular")}
+        if self.structure not in alone.get(how, STRUCTURES):
+            raise UsageError(f"--{how} and --structure {self.structure} contradict each other")
+        if how in ("sketch", "start"):
+            if self.extent == "image":
+                raise UsageError(f"--{how} says itself which objects are drawn: leave out --extent image")
+            if self.focal_mm == "auto":
+                raise UsageError(
+                    f"--{how} is fitted under one focal: give its number, or leave out --focal auto"
+                )
+            if self.lens is not None:
+                raise UsageError(f"--{how} is fitted to the photo as it is: leave out --lens")
+        if how == "recipe paper" and self.extent == "found":
+            raise UsageError("--recipe paper fills the whole image: leave out --extent found")
+        if how == "exhaustive" and self.strict:
+            raise UsageError("--exhaustive walks sketches outside Table 1: leave out --strict")
+        if self.extent == "image" and self.structure in ("circular", "hybrid"):
+            raise UsageError(f"--extent image continues lattices only: leave it out for {self.structure}")
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

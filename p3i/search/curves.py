@@ -157,6 +157,16 @@ def curve_score(fit: CurveFit) -> float:
     return score_of_curve(fit.quality, len(fit.contrast))
 
 
+def values_of(fit: CurveFit) -> dict[str, float]:
+    """The numbers of a fit by the names of their unknowns, such as draw.x.radius.1."""
+    return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
+
+
+def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:
+    """The numbers of a filling [F] in its order."""
+    return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
+
+
 def _whitening(matrix: Tensor, where: Frames) -> Tensor:
     """[N, 2, 2]: differences in pixels to differences in units of their noise, along and across."""
     columns = []

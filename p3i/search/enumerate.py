@@ -31,13 +31,12 @@ class Sketched:
     structure: StructureFound
     sketch: Sketch
     bits: float
-    in_table1: bool
     family: StructureFound | None
 
 
 @dataclass(frozen=True, slots=True)
 class _Form:
-    """A form of `Draw`: its name, its x and y, the loops it needs, and whether Table 1 has it."""
+    """A form of `Draw`: its name, its x and y, and whether Table 1 has it, however it spells a count."""
 
     name: str
     x: str
@@ -115,4 +114,4 @@ def _made(
     bits += 0.0 if form.table1 else _BITS_BEYOND
     name = f"{form.name}, {guards} guard" if guards else form.name
     family = None if form.name.startswith(("row", "spiral")) else structure
-    return Sketched(name, structure, sketch, bits, form.table1, family)
+    return Sketched(name, structure, sketch, bits, family)

@@ -100,7 +100,7 @@ class Evidence:
 
         `name` asks for other features than those of the search.
         """
-        key = name or self.config.features, min(longer, self.image.size.longer)
+        key = name or self.config.features_used, min(longer, self.image.size.longer)
         if key not in self._maps:
             self._maps[key] = extract(self.image, name=key[0], longer=key[1], weights=self.config.weights)
         return self._maps[key]
@@ -109,7 +109,7 @@ class Evidence:
         """The map of that size, blurred by a Gaussian of `blur` map pixels, with its derivatives."""
         # Steps of a factor 2^(1/2) in blur: finer ones would only cost memory.
         step = round(2 * math.log2(max(blur, 0.5))) / 2
-        key = name or self.config.features, min(longer, self.image.size.longer), step
+        key = name or self.config.features_used, min(longer, self.image.size.longer), step
         if key not in self._levels:
             self._levels[key] = _level(self, self.features(longer, name=name), 2.0**step)
         return self._levels[key]

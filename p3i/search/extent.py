@@ -7,8 +7,6 @@ turns agreement into log-odds; the outline of the greatest evidence less descrip
 is unknown, and an outline may or may not run over it.
 """
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -30,24 +28,6 @@ _LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
 
 
-@dataclass(frozen=True, slots=True)
-class Extent:
-    """The cells of a lattice that hold an object.
-
-    `cells` are those that the outline draws and whose middle shows in the photo; `presence` gives each
-    visible cell its probability (0..1) of holding an object, cell by cell, without the outline's help.
-    `i_range`, `j_range` are half-open; a guard (a, b, c) keeps `a*i + b*j >= c`. `agreement` is that of a
-    typical object with the common one (1: all equal).
-    """
-
-    cells: frozenset[tuple[int, int]]
-    presence: dict[tuple[int, int], float]
-    i_range: tuple[int, int]
-    j_range: tuple[int, int]
-    guards: tuple[tuple[int, int, int], ...]
-    agreement: float
-
-
 def find_extent(
     pixels: Floats,
     valid: Mask,
@@ -55,8 +35,8 @@ def find_extent(
     basis: Array,
     origin: Array,
     support: NDArray | None = None,
-) -> Extent | None:
-    """The cells of a lattice that hold an object in a photo; None where none is seen to.
+) -> Outline | None:
+    """The outline of the cells of a lattice that hold an object in a photo; None where none is seen to.
 
     Convention: pixels [H, W, 3] RGB in 0..1, valid [H, W]; `image_from_plane` 3x3 maps plane points in front
     of the camera to positive third coordinates; basis [2, 2] has rows u, v and origin [2] is the middle of an
@@ -71,10 +51,7 @@ def find_extent(
     evidence = _evidence(alike, mask.shape)
     box = alike.sheet.box
     grid = evidence.reshape(box.rows, box.columns)
-    outline = best_outline(grid, i_start=box.i_start, j_start=box.j_start)
-    if outline is None:
-        return None
-    return _extent(alike, evidence, outline, mask.shape)
+    return best_outline(grid, i_start=box.i_start, j_start=box.j_start)
 
 
 def _indices(alike: Alike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -125,20 +102,3 @@ def _score(alike: Alike, kind: Kind, judged: Mask) -> Floats:
     others = judged & (alike.weights < 0.1) & (kind.weights < 0.1)
     outside_level = float(np.clip(np.median(fit[others]), 0, 0.3)) if others.sum() > 8 else 0.15
     return (fit - outside_level) / max(inside_level - outside_level, 0.05)
-
-
-def _extent(alike: Alike, evidence: Array, outline: Outline, shape: tuple[int, int]) -> Extent:
-    i, j = _indices(alike)
-    shown = _middle_shows(alike, shape)
-    drawn = shown & outline.holds(i, j)
-    odds = 1 / (1 + np.exp(-evidence))
-    return Extent(
-        cells=frozenset(zip(i[drawn].tolist(), j[drawn].tolist(), strict=True)),
-        presence={
-            (int(a), int(b)): float(p) for a, b, p in zip(i[shown], j[shown], odds[shown], strict=True)
-        },
-        i_range=outline.i_range,
-        j_range=outline.j_range,
-        guards=outline.guards,
-        agreement=alike.level,
-    )

@@ -11,22 +11,26 @@ theta = base + z @ ties, with base [P] and ties [F, P]; masks bool [S, N].
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from p3i.grammar.ast import Program
+from p3i.grammar.departures import departures
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.sketch import Hole, Sketch, parse_sketch
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import edges, live_indices, nest
 from p3i.search.ranges import Range, default_range
+from p3i.search.thinned import thinned
 
 _ANGLE_DIGITS = 3
 _LENGTH_DIGITS = 4
+# So many combinations of the ends of all extents are tried at first.
+_MOST_COMBINED = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +51,10 @@ class Unknown:
         """What a trace calls it: the first of its paths."""
         return self.paths[0]
 
-    def values(self) -> tuple[int, ...]:
-        """The whole numbers that it may be."""
+    def values(self) -> Sequence[int]:
+        """The whole numbers that it may be, in order; however many, they take no room."""
         first, last = math.ceil(self.range.lower - 1e-9), math.floor(self.range.upper + 1e-9)
-        return tuple(range(first, last + 1))
+        return range(first, last + 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,10 +121,10 @@ def unknowns_of(sketch: Sketch, *, longer_units: tuple[float, float] = (100.0, 1
     families: dict[str, list[Hole]] = {}
     for hole in sketch.holes:
         families.setdefault(f"?{hole.name}" if hole.name is not None else hole.path, []).append(hole)
-    return [_unknown(holes, sketch, longer_units) for holes in families.values()]
+    return [_unknown(holes, longer_units) for holes in families.values()]
 
 
-def _unknown(holes: list[Hole], sketch: Sketch, canvas: tuple[float, float]) -> Unknown:
+def _unknown(holes: list[Hole], canvas: tuple[float, float]) -> Unknown:
     first = holes[0]
     paths = tuple(hole.path for hole in holes)
     # Guards are discrete, so their numbers are searched among whole ones.
@@ -148,16 +152,46 @@ def fillings(
 ) -> Iterator[Filling]:
     """One Filling for each setting of the counts; extents are thinned out to `most_settings`, spread evenly.
 
-    Extents that would draw more than `most_indices` are left for later (`widened` brings them back).
+    Extents that would draw more than `most_indices` are left for later (settings.py weighs them all). Where
+    the least of them draws more than that, it stands for all, with so many of its objects.
     """
     moving = tuple(u for u in unknowns if not u.whole)
-    whole = [u for u in unknowns if u.whole]
-    counts = tuple(u for u in whole if any(path.startswith("draw.") for path in u.paths))
-    extents = tuple(u for u in whole if u not in counts)
+    counts, extents = counts_of(unknowns), extents_of(unknowns)
     for values in itertools.product(*(u.values() for u in counts)):
-        settings = _spread(sketch, counts, values, extents, most_indices, most_settings)
+        settings: list[tuple[int, ...]] = []
+        least: tuple[int, tuple[int, ...]] | None = None
+        for setting in _spread(extents, most_settings):
+            drawn = 2 if not extents else _drawn(sketch, counts, values, extents, setting)
+            if 2 <= drawn <= most_indices:
+                settings.append(setting)
+            elif drawn > most_indices and (least is None or drawn < least[0]):
+                least = drawn, setting
         if settings:
-            yield _filling(sketch, moving, counts, extents, values, settings)
+            yield _filling(sketch, moving, counts, extents, values, tuple(settings))
+        elif least is not None:
+            whole = _filling(sketch, moving, counts, extents, values, (least[1],))
+            kept = thinned(whole.pattern.index, most_indices)
+            yield over(whole, [(int(i), int(j)) for i, j in whole.pattern.index[kept].tolist()])
+
+
+def counts_of(unknowns: list[Unknown]) -> tuple[Unknown, ...]:
+    """The whole numbers that stand in `Draw`: each value of theirs is a generator of its own."""
+    return tuple(u for u in unknowns if u.whole and any(path.startswith("draw.") for path in u.paths))
+
+
+def extents_of(unknowns: list[Unknown]) -> tuple[Unknown, ...]:
+    """The whole numbers that stand in bounds and guards only."""
+    counts = counts_of(unknowns)
+    return tuple(u for u in unknowns if u.whole and u not in counts)
+
+
+def draws(sketch: Sketch) -> Iterator[int]:
+    """How many objects the sketch draws under one setting after another of all its whole numbers."""
+    unknowns = unknowns_of(sketch)
+    counts, extents = counts_of(unknowns), extents_of(unknowns)
+    for values in itertools.product(*(u.values() for u in counts)):
+        for setting in _spread(extents, 2):
+            yield _drawn(sketch, counts, values, extents, setting)
 
 
 def filling_of(text: str) -> Filling:
@@ -181,37 +215,40 @@ def pinned(filling: Filling, z: Tensor, which: Tensor) -> Filling:
     )
 
 
-def all_settings(filling: Filling, *, most: int) -> tuple[tuple[int, ...], ...]:
-    """Every setting of the extents, evenly thinned out where there are more than `most`."""
-    every = tuple(itertools.product(*(u.values() for u in filling.extents)))
-    return every[:: len(every) // (most + 1) + 1]
+def over(filling: Filling, index: list[tuple[int, int]]) -> Filling:
+    """The same numbers and settings over these indices, whatever the settings draw of them."""
+    masks = torch.ones(len(filling.settings), len(index), dtype=torch.bool)
+    return replace(filling, pattern=_pattern_over(filling.pattern, index), masks=masks)
 
 
-def _spread(
+def _spread(extents: tuple[Unknown, ...], most_settings: int) -> Iterator[tuple[int, ...]]:
+    """A few settings of the extents, from the least to the most of each: about `most_settings`, lazily."""
+    each = max(2, round(most_settings ** (1 / max(len(extents), 1))))
+    held = each ** len(extents) > _MOST_COMBINED
+    chosen: list[Sequence[int]] = []
+    for unknown in extents:
+        every = unknown.values()
+        if held and all(path.startswith("if_") for path in unknown.paths):
+            # Too many guards to combine: each lets pass what it can.
+            constant = unknown.name.endswith(".1")
+            chosen.append([every[-1] if constant else min(every, key=abs)])
+        elif len(every) > each:
+            picks = {round(k * (len(every) - 1) / (each - 1)) for k in range(each)}
+            chosen.append([every[place] for place in sorted(picks)])
+        else:
+            chosen.append(every)
+    yield from itertools.product(*chosen)
+
+
+def _drawn(
     sketch: Sketch,
     counts: tuple[Unknown, ...],
     values: tuple[int, ...],
     extents: tuple[Unknown, ...],
-    most_indices: int,
-    most_settings: int,
-) -> tuple[tuple[int, ...], ...]:
-    """A few settings of the extents, from the fewest objects to the most allowed."""
-    if not extents:
-        return ((),)
-    each = max(2, round(most_settings ** (1 / len(extents))))
-    chosen = []
-    for unknown in extents:
-        every = unknown.values()
-        if len(every) > each:
-            picks = {round(k * (len(every) - 1) / (each - 1)) for k in range(each)}
-            every = tuple(every[place] for place in sorted(picks))
-        chosen.append(every)
-    fitting = []
-    for setting in itertools.product(*chosen):
-        drawn = len(live_indices(_set(sketch, (*counts, *extents), (*values, *setting))))
-        if 2 <= drawn <= most_indices:
-            fitting.append(setting)
-    return tuple(fitting)
+    setting: tuple[int, ...],
+) -> int:
+    """How many objects the sketch draws with these whole numbers."""
+    return len(live_indices(_set(sketch, (*counts, *extents), (*values, *setting))))
 
 
 def _set(sketch: Sketch, unknowns: tuple[Unknown, ...], values: tuple[int, ...]) -> Program:
@@ -238,19 +275,21 @@ def _filling(
     for row, pairs in enumerate(drawn):
         masks[row, [places[pair] for pair in pairs]] = True
     whole = compile(_set(sketch, (*counts, *extents), (*values, *settings[-1])))
-    pattern = Pattern(
-        whole.program,
-        whole.paths,
-        whole.theta,
-        torch.tensor(index, dtype=torch.int64).reshape(-1, 2),
-        torch.tensor(edges(index), dtype=torch.int64).reshape(-1, 2),
-    )
+    pattern = _pattern_over(whole, index)
     ties = torch.zeros(len(moving), len(pattern.paths), dtype=torch.float64)
     for row, unknown in enumerate(moving):
         for path in unknown.paths:
             ties[row, pattern.paths.index(path)] = 1
     base = pattern.theta * (ties.sum(0) == 0)
     return Filling(sketch, moving, counts, extents, values, settings, pattern, base, ties, masks)
+
+
+def _pattern_over(pattern: Pattern, index: list[tuple[int, int]]) -> Pattern:
+    return replace(
+        pattern,
+        index=torch.tensor(index, dtype=torch.int64).reshape(-1, 2),
+        edges=torch.tensor(edges(index), dtype=torch.int64).reshape(-1, 2),
+    )
 
 
 def start_values(filling: Filling) -> Tensor | None:
@@ -260,11 +299,12 @@ def start_values(filling: Filling) -> Tensor | None:
     return torch.tensor([unknown.start for unknown in filling.moving], dtype=torch.float64)
 
 
-def whole_program_sketch(program: Program) -> Sketch:
+def whole_program_sketch(program: Program, *, table1: bool = False) -> Sketch:
     """A program as a sketch that starts at its own numbers: camera and `Draw` free, bounds and guards kept.
 
     What x and y of a curve share (the radius and the angle of a circle) stays one number, and a ring does not
-    become a spiral: loop coefficients that are zero inside Cos, Sin and their radius stay zero.
+    become a spiral: loop coefficients that are zero inside Cos, Sin and their radius stay zero. With `table1`
+    so do all numbers that Table 1 has no place for.
     """
     parts = nest(program)
     bound = {"1"} | ({"i"} if parts.for_i else set()) | ({"j"} if parts.for_j else set())
@@ -278,6 +318,8 @@ def whole_program_sketch(program: Program) -> Sketch:
             continue
         inner = kind.endswith((".radius", ".angle", ".offset"))
         if inner and variable != "1" and value == 0:
+            continue
+        if table1 and value == 0 and departures(with_leaves(program, {path: 1.0})):
             continue
         pair = path.removeprefix("draw.x.").removeprefix("draw.y.")
         shared = values.get(f"draw.x.{pair}") == values.get(f"draw.y.{pair}")

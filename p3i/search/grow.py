@@ -48,13 +48,12 @@ class Fit:
     """A refined pattern on a photo.
 
     `index` [N, 2] are the cells in view, `contrast` [N] how well each is predicted by the others beyond half
-    steps, `areas` [N] their shares of the picture; `score` is the sum of what is predicted beyond SUPPORT.
+    steps; `score` is the sum of what is predicted beyond SUPPORT, by their shares of the picture.
     """
 
     theta: Tensor
     index: Tensor
     contrast: Tensor
-    areas: Tensor
     score: float
 
     @property
@@ -77,11 +76,11 @@ def measure(level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | No
 
 
 def weighed(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, contrast: Tensor) -> Fit:
-    """The fit of theta whose cells `index` [N, 2] have this contrast [N], with their shares and its score."""
+    """The fit of theta whose cells `index` [N, 2] have this contrast [N], with its score."""
     area, _ = cell_areas(map_from_index(level, pattern, theta), index, level)
     share = (area / (level.size.width * level.size.height)).float()
     score = float((share * (contrast - SUPPORT).clamp(min=0)).sum())
-    return Fit(theta, index, contrast, share, score)
+    return Fit(theta, index, contrast, score)
 
 
 def grow(

@@ -4,7 +4,9 @@ Each starts from a ring that was found by itself: with its pose, the other rings
 plane (propose/hybrid.py). Then all numbers are fitted together, as with a single ring.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -12,12 +14,13 @@ import torch
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.search.answer import Answer
 from p3i.search.choose import explained_bits
-from p3i.search.curves import CurveFit, curve_score, follow, measured
+from p3i.search.curves import CurveFit, curve_score, follow, measured, numbers_of, values_of
 from p3i.search.fill import Filling, filling_of
 from p3i.search.patches import spacing
 from p3i.search.propose.hybrid import BaseRing, HybridProposal, ring_repeated, rings_around
-from p3i.search.rings import answer_of, found_rings, numbers_of, values_of
+from p3i.search.rings import FoundRing, answer_of, found_rings
 from p3i.search.session import Session
+from p3i.search.table1 import hybrid_in_table1
 
 # A ring that is less sure than this starts nothing.
 _LEAST_QUALITY = 0.15
@@ -45,8 +48,28 @@ _FEWEST_RINGS = 2
 def find_hybrids(session: Session) -> list[Answer]:
     """The hybrids of a photo as finished programs, the most worth first; none where no ring convinces."""
     found: list[tuple[float, float, CurveFit]] = []
+    with session.until_interrupted():
+        _find_all(session, found_rings(session), found)
+    found.sort(key=lambda triple: -triple[0])
+    answers: list[Answer] = []
+    for _, score, fit in found:
+        if len(answers) >= _MOST_TOLD:
+            break
+        free = answer_of(session, fit, "hybrid", score)
+        answer = session.completed(partial(_without_empty_middle, session, free))
+        if session.config.strict:
+            answers += session.completed(partial(hybrid_in_table1, session, fit, answer))
+        else:
+            answers.append(answer)
+    return answers
+
+
+def _find_all(
+    session: Session, rings: Sequence[FoundRing], found: list[tuple[float, float, CurveFit]]
+) -> None:
+    """Start from each ring that convinces; what is found goes into `found`: its rank, its score, the fit."""
     done: list[BaseRing] = []
-    for ring in found_rings(session):
+    for ring in rings:
         if min(ring.fit.quality, 1.5 * ring.score) < _LEAST_QUALITY or len(ring.fit.contrast) < _FEWEST:
             continue
         if not session.go_on():
@@ -56,16 +79,12 @@ def find_hybrids(session: Session) -> list[Answer]:
         if found and any(_same(base, other) for other in done):
             continue
         done.append(base)
-        fits = _fits(session, ring.fit, rings_around(session.evidence, base))
-        if base.count * abs(base.step_deg) > _CLOSED_DEG:
-            fits += _fits(session, ring.fit, ring_repeated(session.evidence, base))
-        for fit in fits:
-            # As with rings, how surely it repeats may be told at another radius than that of the objects.
-            score = max(curve_score(fit), ring.score * min(1.0, fit.quality / ring.fit.quality))
-            found.append((fit.mean * len(fit.contrast), score, fit))
-    found.sort(key=lambda triple: -triple[0])
-    answers = [answer_of(session, fit, "hybrid", score) for _, score, fit in found[:_MOST_TOLD]]
-    return [_without_empty_middle(session, answer) for answer in answers]
+        closed = base.count * abs(base.step_deg) > _CLOSED_DEG
+        for propose in (rings_around, ring_repeated) if closed else (rings_around,):
+            for fit in _fits(session, ring.fit, propose(session.evidence, base)):
+                # As with rings, how surely it repeats may be told at another radius than the objects'.
+                score = max(curve_score(fit), ring.score * min(1.0, fit.quality / ring.fit.quality))
+                found.append((fit.mean * len(fit.contrast), score, fit))
 
 
 def _without_empty_middle(session: Session, answer: Answer) -> Answer:
@@ -86,21 +105,24 @@ def _without_empty_middle(session: Session, answer: Answer) -> Answer:
         bits, answer = more, later
 
 
-def _fits(session: Session, ring: CurveFit, proposals: list[HybridProposal]) -> list[CurveFit]:
-    """The proposals that hold, fitted, with all the rings that they go on to."""
-    found: list[CurveFit] = []
+def _fits(session: Session, ring: CurveFit, proposals: list[HybridProposal]) -> Iterator[CurveFit]:
+    """The proposals that hold, fitted, with all the rings that they go on to, each as soon as it is."""
     kept: list[HybridProposal] = []
     for proposal in sorted(proposals, key=lambda proposal: -proposal.objects):
+        if kept and not session.go_on():
+            return
         if any(_alike(proposal, other) for other in kept):
             continue
         fit = _fitted(session, ring, proposal)
         if fit is None or not _holds(fit, ring):
             continue
         kept.append(proposal)
-        fit = _grown(session, fit, proposal)
+        grown = [fit]
+        with session.until_interrupted():
+            _grow(session, grown, proposal)
+        fit = grown[-1]
+        yield fit
         session.record("hybrid", program=fit.filling.program(fit.z, ()), score=fit.quality)
-        found.append(fit)
-    return found
 
 
 def _same(first: BaseRing, second: BaseRing) -> bool:
@@ -117,10 +139,11 @@ def _alike(first: HybridProposal, second: HybridProposal) -> bool:
     return abs(first.growth - second.growth) + abs(first.radius - second.radius) < 0.1 * second.growth
 
 
-def _grown(session: Session, fit: CurveFit, proposal: HybridProposal) -> CurveFit:
-    """The hybrid with further rings at either end, as long as these hold as well."""
-    side = _CLOSE_LOOK * fit.side
+def _grow(session: Session, grown: list[CurveFit], proposal: HybridProposal) -> None:
+    """Add to `grown`, which holds a hybrid, the same with further rings at either end that hold as well."""
+    side = _CLOSE_LOOK * grown[0].side
     for _ in range(_MOST_GROWTHS):
+        fit = grown[-1]
         values = values_of(fit)
         for change in ({"last": proposal.last + 1}, {"first": proposal.first - 1}):
             wider = replace(proposal, **change)
@@ -140,11 +163,11 @@ def _grown(session: Session, fit: CurveFit, proposal: HybridProposal) -> CurveFi
                 moved = follow(session.evidence, more, rounds=2, free_focal=session.focal_is_free)
                 whole = measured(session.evidence, filling, moved.z, focal_mm=moved.focal_mm, side=fit.side)
                 if whole is not None:
-                    fit, proposal = replace(whole, cost=moved.cost), wider
+                    grown.append(replace(whole, cost=moved.cost))
+                    proposal = wider
                     break
         else:
-            return fit
-    return fit
+            return
 
 
 def hybrid_filling(proposal: HybridProposal) -> Filling:

@@ -12,7 +12,7 @@ from p3i.search.lattice import Lattice, lattice_pattern, map_from_index
 from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.primitive import primitive
 from p3i.search.propose.lattice import straightened_proposals, window_proposals
-from p3i.search.result import NEEDED, StopReason
+from p3i.search.result import NEEDED
 from p3i.search.score import score_of
 from p3i.search.session import Session
 
@@ -43,20 +43,20 @@ def find_lattices(session: Session) -> list[Answer]:
     """The lattices of a photo as finished programs, the most worth first."""
     pattern = lattice_pattern()
     fits: list[Fit] = []
-    try:
+    with session.until_interrupted():
         _grow_all(session, pattern, fits)
-    except KeyboardInterrupt:
-        session.stopped = StopReason.INTERRUPTED
     fits.sort(key=lambda fit: -worth(fit))
     answers: list[Answer] = []
-    try:
+    finished = False
+    with session.until_interrupted():
         _finish_all(session, pattern, fits, answers)
-    except KeyboardInterrupt:  # what is finished by now is kept, and the best is worth the wait
-        session.stopped = StopReason.INTERRUPTED
-        if fits and not answers:
-            _finish_all(session, pattern, fits[:1], answers)
+        finished = True
+    if not finished and not answers:  # what is finished by now is kept, and the best is worth the wait
+        _finish_all(session, pattern, fits[:1], answers)
     answers.sort(key=lambda answer: -answer.worth)
-    return with_note_of_others(session, pattern, fits, answers, finish=_finished)
+    with session.until_interrupted():
+        return with_note_of_others(session, pattern, fits, answers, finish=_finished)
+    return answers
 
 
 def worth(fit: Fit) -> float:
@@ -166,7 +166,7 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     if measured is None:
         return None
     score = score_of(measured.contrast)
-    if session.config.extent == "image":
+    if session.config.extent_used == "image":
         layout = filling_layout(session.evidence, pattern, layout)
     program = layout.program(from_zero=not session.config.strict)
     session.record("candidate", program=program, score=score, worth=worth(measured))

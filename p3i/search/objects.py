@@ -90,10 +90,10 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
         lattice.rx_deg, lattice.ry_deg, size=image.size, focal_mm=evidence.focal_mm
     ).numpy()
     support = _painted(evidence, ground, matrix, lattice)
-    phase = find_phase(image.pixels, image.valid, matrix, lattice.basis, support)
-    if phase is None:
+    origin = find_phase(image.pixels, image.valid, matrix, lattice.basis, support)
+    if origin is None:
         return None
-    lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, phase.origin)
+    lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, origin)
     found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
     if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
         return None  # one row fixes no plane

@@ -47,14 +47,23 @@ def find_by_paper(session: Session) -> list[Answer]:
     features = evidence.features(COARSE)
     numbers = _grid(session.generator)
     losses: list[Tensor] = []
-    for first in range(0, len(numbers), _BATCH):
-        if losses and not session.go_on():
-            break
-        session.tell("the paper's grid", 0.5 * first / len(numbers))
-        with torch.no_grad():
-            losses.append(equation2(evidence, features, numbers[first : first + _BATCH]))
+    with session.until_interrupted():
+        for first in range(0, len(numbers), _BATCH):
+            if losses and not session.go_on():
+                break
+            session.tell("the paper's grid", 0.5 * first / len(numbers))
+            with torch.no_grad():
+                losses.append(equation2(evidence, features, numbers[first : first + _BATCH]))
+    if not losses:
+        return []
     order = torch.argsort(torch.cat(losses), stable=True)[:DESCENTS]
     moved = _descended(session, features, numbers[order])
+    return session.completed(lambda: _answers(session, features, moved))
+
+
+def _answers(session: Session, features: FeatureMap, moved: Tensor) -> list[Answer]:
+    """The lattices [K, 6] of least loss as programs, the least first."""
+    evidence = session.evidence
     with torch.no_grad():
         loss = equation2(evidence, features, moved)
     answers: list[Answer] = []
@@ -119,21 +128,22 @@ def _allowed(numbers: Tensor) -> Tensor:
 def _descended(session: Session, features: FeatureMap, numbers: Tensor) -> Tensor:
     """The numbers [K, 6] after Adam on equation 2 alone, which rewards shrunk and blurred views."""
     first, second = torch.zeros_like(numbers), torch.zeros_like(numbers)
-    for step in range(1, STEPS + 1):
-        if not session.go_on():
-            break
-        session.tell("the paper's descent", 0.5 + 0.5 * step / STEPS)
-        leaf = numbers.clone().requires_grad_()
-        loss = equation2(session.evidence, features, leaf)
-        (slope,) = torch.autograd.grad(loss[torch.isfinite(loss)].sum(), leaf)
-        slope = torch.nan_to_num(slope)
-        first = 0.9 * first + 0.1 * slope
-        second = 0.999 * second + 0.001 * slope.square()
-        move = (first / (1 - 0.9**step)) / ((second / (1 - 0.999**step)).sqrt() + 1e-8)
-        after = numbers - RATE * move
-        # Outside the grid's bounds the sum of nothing would be the least.
-        tilted = after[:, :2].abs().amax(1) > _MOST_TILT_DEG
-        numbers = torch.where((_allowed(after) & ~tilted)[:, None], after, numbers)
+    with session.until_interrupted():
+        for step in range(1, STEPS + 1):
+            if not session.go_on():
+                break
+            session.tell("the paper's descent", 0.5 + 0.5 * step / STEPS)
+            leaf = numbers.clone().requires_grad_()
+            loss = equation2(session.evidence, features, leaf)
+            (slope,) = torch.autograd.grad(loss[torch.isfinite(loss)].sum(), leaf)
+            slope = torch.nan_to_num(slope)
+            first = 0.9 * first + 0.1 * slope
+            second = 0.999 * second + 0.001 * slope.square()
+            move = (first / (1 - 0.9**step)) / ((second / (1 - 0.999**step)).sqrt() + 1e-8)
+            after = numbers - RATE * move
+            # Outside the grid's bounds the sum of nothing would be the least.
+            tilted = after[:, :2].abs().amax(1) > _MOST_TILT_DEG
+            numbers = torch.where((_allowed(after) & ~tilted)[:, None], after, numbers)
     return numbers
 
 

@@ -9,8 +9,6 @@ photographs of many kinds; where thin lines cross on a plain ground, they take t
 between the lines, for the object (a Go board and a fence, but alas also the ruled cells of a sudoku).
 """
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -26,21 +24,8 @@ Mask = NDArray[np.bool_]
 WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
 """How much each cue of phase_cues speaks."""
 _STEP = 2  # samples between the phases that the rim is asked about
-_LEAST_CHANCE = 0.003  # probability of an alternative worth telling
+_LEAST_CHANCE = 0.003  # probability of another phase worth a look
 _NEAR = 0.13  # of a period: phases closer than this are the same answer
-
-
-@dataclass(frozen=True, slots=True)
-class Phase:
-    """Where an object's middle is: `origin` [2], in plane coordinates, near the middle of the pattern.
-
-    `confidence` in 0..1 is the probability that it is right to within an eighth of a period;
-    `alternatives` are the next best origins with theirs.
-    """
-
-    origin: Array
-    confidence: float
-    alternatives: tuple[tuple[Array, float], ...]
 
 
 def find_phase(
@@ -49,8 +34,10 @@ def find_phase(
     image_from_plane: Array,
     basis: Array,
     support: NDArray | None = None,
-) -> Phase | None:
-    """The middle of an object of a known lattice; None where no cell of it shows.
+) -> Array | None:
+    """The middle of an object of a known lattice, near the middle of the pattern: a plane point [2].
+
+    None where no cell of it shows.
 
     Convention: as in p3i.search.extent.find_extent; the plane may have any origin.
     """
@@ -159,8 +146,8 @@ def _whole(alike: Alike) -> Array:
     return result
 
 
-def _phase(alike: Alike, basis: Array, origin: Array, worth: Array) -> Phase:
-    """The best phases by worth [side, side], as plane points next to the middle of the pattern."""
+def _phase(alike: Alike, basis: Array, origin: Array, worth: Array) -> Array:
+    """The most probable phase by worth [side, side], as a plane point next to the middle of the pattern."""
     n, box = alike.sheet.side, alike.sheet.box
     odds = np.exp(worth - worth.max())
     odds /= odds.sum()
@@ -182,8 +169,7 @@ def _phase(alike: Alike, basis: Array, origin: Array, worth: Array) -> Phase:
         cell = (np.array([column, row]) + step + 0.5) / n - 0.5
         found.append((origin + (middle + cell) @ basis, mass))
         left[close] = 0
-    found.sort(key=lambda phase: -phase[1])
-    return Phase(found[0][0], found[0][1], tuple(found[1:]))
+    return max(found, key=lambda phase: phase[1])[0]
 
 
 def _peak(line: Array, at: int) -> float:

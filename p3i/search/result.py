@@ -39,6 +39,7 @@ class StopReason(Enum):
     NO_PATTERN = "no regular pattern"
     COSTS_MORE = "no regular pattern: what repeats is less than the program takes to write"
     NO_FIT = "the sketch does not fit this photo"
+    OUTSIDE_TABLE_1 = "the pattern that was found cannot be written in the paper's Table 1, as strict asks"
     TOO_SMALL = "the picture is too small to hold a pattern"
     FLAT = "the picture has too little contrast to hold a pattern"
     TOO_LITTLE_KNOWN = "too few pixels of the picture are known (the rest is masked or transparent)"

@@ -2,18 +2,19 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-import torch
 
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.curves import CurveFit, curve_score, follow, measured
+from p3i.search.curves import CurveFit, curve_score, follow, measured, numbers_of, values_of
 from p3i.search.fill import Filling, filling_of
 from p3i.search.propose.ring import RingProposal, ring_proposals
 from p3i.search.result import StructureFound
 from p3i.search.sector import Place, Ring, places
 from p3i.search.session import Session
+from p3i.search.table1 import ring_in_table1
 
 # So many proposals are fitted, and so many fits are finished.
 _MOST_FITTED = 8
@@ -46,7 +47,14 @@ class FoundRing:
 
 def find_rings(session: Session) -> list[Answer]:
     """The rings of a photo as finished programs, the most worth first."""
-    return [answer_of(session, ring.fit, "circular", ring.score) for ring in found_rings(session)]
+    answers: list[Answer] = []
+    for ring in found_rings(session):
+        answer = answer_of(session, ring.fit, "circular", ring.score)
+        if session.config.strict:
+            answers += session.completed(partial(ring_in_table1, session, ring.fit, answer))
+        else:
+            answers.append(answer)
+    return answers
 
 
 def found_rings(session: Session) -> tuple[FoundRing, ...]:
@@ -54,18 +62,29 @@ def found_rings(session: Session) -> tuple[FoundRing, ...]:
     if session.rings is None:
         session.tell("turning", 0.82)
         fits: list[CurveFit] = []
-        for proposal in ring_proposals(session.evidence, seed=session.config.seed)[:_MOST_FITTED]:
-            if not session.go_on():
-                break
-            fit = ring_fit(session, proposal)
-            if fit is None:
-                continue
-            fits.append(fit)
-            session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
+        with session.until_interrupted():
+            for proposal in ring_proposals(session.evidence, seed=session.config.seed)[:_MOST_FITTED]:
+                if not session.go_on():
+                    break
+                fit = ring_fit(session, proposal)
+                if fit is None:
+                    continue
+                fits.append(fit)
+                session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
         fits.sort(key=lambda fit: -curve_score(fit))  # a third of a ring agrees as well as all of it
-        rings = [_finished(session, fit) for fit in fits[:_MOST_FINISHED]]
-        session.rings = tuple(sorted(rings, key=lambda ring: -ring.score))
+        session.rings = tuple(sorted(_all_finished(session, fits), key=lambda ring: -ring.score))
     return session.rings
+
+
+def _all_finished(session: Session, fits: list[CurveFit]) -> list[FoundRing]:
+    """The best fits finished; the very best of them even where the search is over."""
+    rings: list[FoundRing] = []
+    with session.until_interrupted():
+        for fit in fits[:_MOST_FINISHED]:
+            if rings and not session.go_on():
+                break
+            rings.append(_finished(session, fit))
+    return rings if rings or not fits else [_finished(session, fits[0])]
 
 
 def answer_of(session: Session, fit: CurveFit, structure: StructureFound, score: float) -> Answer:
@@ -249,13 +268,3 @@ def _ring_of(session: Session, fit: CurveFit) -> Ring:
         weights=fit.contrast.numpy().astype(float),
         image_from_plane=seen.numpy(),
     )
-
-
-def values_of(fit: CurveFit) -> dict[str, float]:
-    """The numbers of a fit by the names of their unknowns, such as draw.x.radius.1."""
-    return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
-
-
-def numbers_of(filling: Filling, values: dict[str, float]) -> torch.Tensor:
-    """The numbers of a filling [F] in its order."""
-    return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)

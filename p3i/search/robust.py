@@ -29,14 +29,13 @@ def fit_instances(
     found: Instances,
     *,
     weights: Tensor,
-    fixed: frozenset[str] = frozenset(),
     iterations: int = 6,
 ) -> Tensor:
     """Move theta [P] so that the program's points fall on the instances; robust against strays.
 
     Offsets are compared in index units, so that near and far objects count alike.
     """
-    free = free_numbers(pattern, theta, fixed=fixed)
+    free = free_numbers(pattern, theta)
     targets, _ = sample_points(level, pattern, theta, found.index + found.offsets)
     inverse, cell = _index_from_map(level, pattern, theta, found.index)
     noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()

@@ -93,7 +93,7 @@ def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -
 
 def judging_features(config: SearchConfig) -> tuple[str, ...]:
     """The features that programs are judged by, each alone: the search's, and these with the colours."""
-    names = config.features
+    names = config.features_used
     return (names,) if "rgb" in names.split("+") else (names, names + "+rgb")
 
 

@@ -56,14 +56,10 @@ class Ring:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A radius (program units) and a turn (degrees, to be added to first_deg) at which objects may lie.
-
-    `worth` is how much of the drawing repeats at that radius.
-    """
+    """A radius (program units) and a turn (degrees, to be added to first_deg) at which objects may lie."""
 
     radius: float
     turn_deg: float
-    worth: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +99,7 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
         cell = np.asarray(template[:, rows], np.float32)
         down, turn = _middle(sectors, ring, cell, rows, profile[rows] / profile[row])
         radius = float(np.interp(row + down, np.arange(len(profile)), sectors.radii))
-        found.append(Place(radius, turn * ring.step_deg, float(profile[row])))
+        found.append(Place(radius, turn * ring.step_deg))
     return found
 
 

@@ -24,7 +24,6 @@ from p3i.search.coarse import PointMaps, kept_within
 from p3i.search.curves import CurveFit, follow, measured
 from p3i.search.fill import (
     Filling,
-    all_settings,
     fillings,
     pinned,
     unknowns_of,
@@ -34,6 +33,8 @@ from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
 from p3i.search.score import normalised_score
 from p3i.search.session import Session
+from p3i.search.settings import best_setting, widened
+from p3i.search.thinned import thinned
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +56,8 @@ WALKED = Effort(24_000, 600, 4, 1)
 _ENOUGH = 0.35
 # Objects that a sketch may draw in the coarse search, and settings of its extents there.
 _MOST_INDICES, _MOST_SETTINGS = 64, 8
-# Settings of the extents that are weighed in the end.
-_ALL_SETTINGS = 4000
+# Of more objects in sight than this, so many say which are there.
+_MOST_WEIGHED = 2000
 # Rounds of registration.
 _ROUNDS, _LAST_ROUNDS = 3, 5
 # A pattern that was caught by its middle may grow by an object as often as this.
@@ -74,7 +75,6 @@ class _Fit:
 
     curve: CurveFit
     setting: tuple[int, ...]
-    worth: float
 
 
 def find_by_sketch(
@@ -93,12 +93,13 @@ def find_by_sketch(
     starts = [start for answer in known if (start := written_in(every, answer.program)) is not None]
     answers = _answers(session, starts, done=0.0, share=0.0)
     maps: PointMaps | None = None
-    for turn in range(effort.rounds):
-        enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
-        if enough or not session.go_on():
-            break
-        maps = maps or PointMaps.of(session.evidence)
-        answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
+    with session.until_interrupted():
+        for turn in range(effort.rounds):
+            enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
+            if enough or not session.go_on():
+                break
+            maps = maps or PointMaps.of(session.evidence)
+            answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
     return _different(sorted(answers, key=lambda answer: -answer.score))
 
 
@@ -109,35 +110,43 @@ def _searched(
     budget = max(effort.least, effort.points // len(every))
     share = 1 / effort.rounds
     found: list[Found] = []
-    for place, filling in enumerate(every):
-        if found and not session.go_on():
-            break
-        session.tell("looking through the holes", done + share * 0.7 * place / len(every))
-        found += search_grid(session, maps, filling, budget=budget, keep=effort.fits)
-    found = distinct(maps, sorted(found, key=lambda one: -one.score))[: effort.fits]
-    for one in found:
-        session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
+    with session.until_interrupted():
+        for place, filling in enumerate(every):
+            if found and not session.go_on():
+                break
+            session.tell("looking through the holes", done + share * 0.7 * place / len(every))
+            found += search_grid(session, maps, filling, budget=budget, keep=effort.fits)
+    found.sort(key=lambda one: -one.score)
+    found = session.completed(lambda: distinct(maps, found))[: effort.fits]
+    with session.until_interrupted():
+        for one in found:
+            session.record("grid", score=one.score, program=_text(one.filling, one.z, one.setting))
     return _answers(session, found, done=done + share * 0.7, share=share * 0.3)
 
 
 def _answers(session: Session, found: Sequence[Found], *, done: float, share: float) -> list[Answer]:
     """What was found, fitted to its objects; `done` and `share` are parts of the whole search."""
     answers: list[Answer] = []
-    for place, one in enumerate(found):
-        if answers and not session.go_on():
-            break
-        session.tell("fitting to the objects", done + share * place / len(found))
-        fit = _fitted(session, one)
-        if fit is not None:
-            answers.append(_answer(session, fit))
-            session.record("fit", score=answers[-1].score, program=format_program(answers[-1].program))
+    reached = 0
+    with session.until_interrupted():
+        for place, one in enumerate(found):
+            if answers and not session.go_on():
+                break
+            session.tell("fitting to the objects", done + share * place / len(found))
+            reached = place
+            _fit_to_objects(session, one, answers)
+        return answers
+    if not answers and found:  # the one that was begun is worth the wait
+        _fit_to_objects(session, found[reached], answers)
     return answers
 
 
-def most_drawn(sketch: Sketch) -> int:
-    """The most objects that a filling of the sketch can draw."""
-    every = fillings(sketch, unknowns_of(sketch), most_indices=10**6, most_settings=_MOST_SETTINGS)
-    return max((int(filling.masks.sum(1).max()) for filling in every), default=0)
+def _fit_to_objects(session: Session, found: Found, answers: list[Answer]) -> None:
+    """Fit what was found in the grid; its answer, if it has one, goes into `answers`."""
+    fit = _fitted(session, found)
+    if fit is not None:
+        answers.append(_answer(session, fit))
+        session.record("fit", score=answers[-1].score, program=format_program(answers[-1].program))
 
 
 def _fitted(session: Session, found: Found) -> _Fit | None:
@@ -148,10 +157,9 @@ def _fitted(session: Session, found: Found) -> _Fit | None:
     if now is None:
         return None
     now = _on_objects(session, now)
-    settings = all_settings(filling, most=_ALL_SETTINGS)
-    wide = with_settings(filling, settings)
+    wide = widened(filling)
     for _ in range(_EXTENTS_TRIED):
-        chosen = _best_extent(session, wide, now)
+        chosen = _best_extent(session, wide, now, setting)
         if chosen is None or (chosen[1] == setting and torch.equal(chosen[0], now.z)):
             break
         z, setting = chosen
@@ -162,7 +170,7 @@ def _fitted(session: Session, found: Found) -> _Fit | None:
     last = _followed(session, now.filling, now.z, rounds=_LAST_ROUNDS)
     best = last if last is not None and last.mean >= now.mean else now
     best = _centred(session, best)
-    return _Fit(best, setting, best.mean)
+    return _Fit(best, setting)
 
 
 def _followed(session: Session, filling: Filling, z: Tensor, *, rounds: int) -> CurveFit | None:
@@ -211,7 +219,9 @@ def _centred(session: Session, fit: CurveFit) -> CurveFit:
     return again if again is not None and again.mean > 0.8 * fit.mean else fit
 
 
-def _best_extent(session: Session, wide: Filling, now: CurveFit) -> tuple[Tensor, tuple[int, ...]] | None:
+def _best_extent(
+    session: Session, wide: Filling, now: CurveFit, setting: tuple[int, ...]
+) -> tuple[Tensor, tuple[int, ...]] | None:
     """Which objects are there: the setting of the extents that draws most of them and little else.
 
     Where the sketch's numbers allow, its indices are also counted from one object earlier or later.
@@ -222,10 +232,10 @@ def _best_extent(session: Session, wide: Filling, now: CurveFit) -> tuple[Tensor
         z = now.z if shift == (0, 0) else _shifted(wide, now.z, shift)
         if z is None:
             continue
-        gain = wide.masks.double() @ _gains(session, wide, z, side=now.side, typical=typical)
-        value, place = gain.max(0)
-        if best is None or float(value) > best[0] + 0.5 * typical * (shift != (0, 0)):
-            best = (float(value), z, wide.settings[int(place)])
+        gains = _gains(session, wide, z, side=now.side, typical=typical)
+        value, chosen = best_setting(wide, gains, setting)
+        if best is None or value > best[0] + 0.5 * typical * (shift != (0, 0)):
+            best = value, z, chosen
     return None if best is None else best[1:]
 
 
@@ -236,9 +246,11 @@ def _gains(session: Session, wide: Filling, z: Tensor, *, side: float, typical: 
     seen = evidence.in_sight(wide.pattern, theta)
     gains = torch.full((len(seen),), -0.02 * typical, dtype=torch.float64)
     if int(seen.sum()) >= 3:
-        index = wide.pattern.index[seen].double()
+        at = torch.nonzero(seen)[:, 0]
+        at = at[thinned(wide.pattern.index[at], _MOST_WEIGHED)]
+        index = wide.pattern.index[at].double()
         found = patch_contrast(evidence, wide.pattern, theta, index, side=side, focal_mm=evidence.focal_mm)
-        gains[seen] = found.contrast.double() - _PRESENT * typical
+        gains[at] = found.contrast.double() - _PRESENT * typical
     return gains
 
 

@@ -28,6 +28,7 @@ from p3i.search.result import (
 )
 from p3i.search.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
+from p3i.search.table1 import unwritable_note, within_table1
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads
 
@@ -50,7 +51,8 @@ def synthesize(
     """Find the camera and the program of the pattern on a photo.
 
     The result's `program` is None where nothing reaches the score NEEDED; then `stop` and `score` say why.
-    The program has no header yet. A KeyboardInterrupt ends the search with the best that was found.
+    The program has no header yet. A KeyboardInterrupt ends the search with the best that was found; a second
+    one, while that is being finished, is raised.
     """
     with limited_threads(config.threads):
         return _searched(image, config, progress, trace)
@@ -61,30 +63,36 @@ def _searched(
 ) -> SynthesisResult:
     """`synthesize`, however many threads there are."""
     assumed = focal_of(image, config)
-    focal_mm, _ = assumed
-
-    def result(program: Program | None, stop: StopReason, **more: object) -> SynthesisResult:
-        told = {**_focal_facts(None, assumed), "features": config.features, "seed": config.seed, **more}
-        return SynthesisResult(program=program, stop=stop, **told)  # pyright: ignore[reportArgumentType]
-
     hopeless = _hopeless(image)
     if hopeless is not None:
-        return result(None, hopeless)
+        return _told(config, assumed, None, hopeless)
     check_asked(config, image.size)
-    session = Session(Evidence(image, config, focal_mm), config, progress, trace and _in_text(trace))
+    session = Session(Evidence(image, config, assumed[0]), config, progress, trace and _in_text(trace))
     width, height = image.size.width, image.size.height
-    session.record("photo", width=width, height=height, focal=focal_mm, version=TRACE_VERSION)
-    answers = _found(session) if config.lens is None else find_with_lens(session, _found)
+    session.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
+    answers = _found(session) if config.lens is None else _found_with_lens(session)
+    return session.completed(lambda: _result(session, answers, assumed=assumed))
+
+
+def _result(
+    session: Session, answers: list[Answer], *, assumed: tuple[float, FocalSource]
+) -> SynthesisResult:
+    """The best of the answers as the result of the search, or why none of them is one."""
+    config, image, focal_mm = session.config, session.evidence.image, assumed[0]
     needed = needed_for(config)
-    if config.focal_mm == "auto" and config.sketch is None and config.start is None:
+    if config.focal_mm == "auto":
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
+    if config.strict:
+        answers = within_table1(session, answers)
     sure = [answer for answer in answers if answer.score >= needed]
     # What a person asked for is theirs to choose, whatever it costs.
     good = sure if asked_for(config) is not None else [answer for answer in sure if answer.worth > 0]
     if not good:
         best = max((answer.score for answer in answers), default=0.0)
         reason = StopReason.COSTS_MORE if sure else why_not(config)
-        refused = result(None, session.stopped or reason, score=best, needed=needed)
+        if session.unwritable and not sure:
+            reason = StopReason.OUTSIDE_TABLE_1
+        refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
         session.record("answer", program=None, score=best, reason=refused.reason)
         return refused
     good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
@@ -93,9 +101,15 @@ def _searched(
     margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(session, first)
     notes = first.notes if other is None else (*first.notes, ambiguity_note(other))
+    if config.extent_used == "image" and first.structure != "lattice":
+        notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
+    if session.unwritable - {first.structure}:
+        notes = (*notes, unwritable_note(session))
     session.tell("done", 1.0)
     session.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
-    return result(
+    return _told(
+        config,
+        assumed,
         first.program,
         session.stopped or StopReason.FOUND,
         structure=first.structure,
@@ -120,10 +134,22 @@ def _searched(
     )
 
 
+def _told(
+    config: SearchConfig,
+    assumed: tuple[float, FocalSource],
+    program: Program | None,
+    stop: StopReason,
+    **more: object,
+) -> SynthesisResult:
+    """A result with the facts that every one has, and `more`."""
+    told = {**_focal_facts(None, assumed), "features": config.features_used, "seed": config.seed, **more}
+    return SynthesisResult(program=program, stop=stop, **told)  # pyright: ignore[reportArgumentType]
+
+
 def _found(session: Session) -> list[Answer]:
     """What every family that is asked for finds, the most worth first; an interrupt ends the search."""
     answers: list[list[Answer]] = []
-    try:
+    with session.until_interrupted():
         asked = asked_for(session.config)
         if asked is not None:
             answers.append(asked(session))
@@ -133,15 +159,32 @@ def _found(session: Session) -> list[Answer]:
                 for found in answers
                 for answer in found
             )
+            if answers and not session.go_on():
+                break
             if session.config.structure == family.structure or (
                 session.config.structure == "auto" and not beyond_doubt
             ):
                 answers.append(family.find(session))
-        if session.config.exhaustive_s is not None:
+        if session.config.exhaustive_s is not None and session.go_on():
             answers.append(walk(session))
-    except KeyboardInterrupt:
-        session.stopped = StopReason.INTERRUPTED
-    return by_explained(session.evidence, answers, needed=needed_for(session.config))
+    return session.completed(
+        lambda: by_explained(session.evidence, answers, needed=needed_for(session.config))
+    )
+
+
+def _found_with_lens(session: Session) -> list[Answer]:
+    """What is found through the lens of the options; once interrupted, what the photo as it is had shown."""
+    plain: list[Answer] = []
+
+    def search(inner: Session) -> list[Answer]:
+        found = _found(inner)
+        if inner is session:
+            plain[:] = found
+        return found
+
+    with session.until_interrupted():
+        return find_with_lens(session, search)
+    return plain
 
 
 def _in_text(trace: Trace) -> Trace:
@@ -159,11 +202,9 @@ def _mirrored(session: Session, answer: Answer) -> Camera | None:
     """The other tilt that a ring leaves open; more than one circle tells the tilt, and no time is no look."""
     if answer.structure != "circular" or answer.lens_k1 is not None or session.stopped is not None:
         return None
-    try:
+    with session.until_interrupted():
         return mirrored_camera(session.evidence, answer)
-    except KeyboardInterrupt:
-        session.stopped = StopReason.INTERRUPTED
-        return None
+    return None
 
 
 def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:

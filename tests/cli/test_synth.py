@@ -77,7 +77,7 @@ class Search:
             focal_mm=config.focal_mm or 35.0,
             focal_source="option" if config.focal_mm else "default",
             focal_reason=FOCAL_REASONS["option" if config.focal_mm else "default"],
-            features=config.features,
+            features=config.features_used,
             seed=config.seed,
         )
 

@@ -109,7 +109,7 @@ def test_a_file_that_is_not_there_is_code_3(photo: Path, capsys: pytest.CaptureF
 
 def test_the_papers_recipe_is_one_configuration() -> None:
     config = SearchConfig(recipe="paper")
-    assert (config.features, config.extent) == ("rgb", "image")
-    assert SearchConfig(recipe="paper", weights=Path("alexnet.pth")).features == "alexnet"
+    assert (config.features_used, config.extent_used) == ("rgb", "image")
+    assert SearchConfig(recipe="paper", weights=Path("alexnet.pth")).features_used == "alexnet"
     with pytest.raises(p3i.UsageError):
         SearchConfig(exhaustive_s=0)

@@ -4,6 +4,7 @@ import pytest
 from truth import pose_error_deg, small_scene
 
 import p3i
+from p3i.errors import SketchError
 from p3i.evaluation.program_scenes import program_scene
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.camera import Camera
@@ -74,6 +75,12 @@ def test_an_answer_with_a_focal_of_its_own_keeps_its_vanishing_line_under_the_as
     now = Camera.of(one.program, focal_mm=35.0).horizon(size)
     assert one.focal_mm is None and own is not None and now == pytest.approx(own)
     assert asked._refocused(one, 50.0) is one
+
+
+def test_a_start_that_was_found_through_a_lens_is_refused_and_not_bent_in_silence() -> None:
+    text = "# /// p3p\n# version = 1\n# lens_k1 = -0.1\n# ///\n" + ROW
+    with pytest.raises(SketchError, match="has a lens"):
+        asked.check_asked(SearchConfig(start=p3i.loads(text)), Size(400, 300))
 
 
 def test_the_walk_tries_the_shortest_sketches_that_no_family_covers(monkeypatch: pytest.MonkeyPatch) -> None:

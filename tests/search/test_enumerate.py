@@ -1,7 +1,9 @@
 """The sketches that the exhaustive search walks through."""
 
+import itertools
+
 from p3i.grammar.departures import departures
-from p3i.grammar.sketch import format_sketch
+from p3i.grammar.sketch import Sketch, format_sketch
 from p3i.search.enumerate import sketches_by_length
 from p3i.search.sketched import structure_of
 
@@ -19,27 +21,21 @@ def test_a_sketch_has_the_structure_that_its_text_spells() -> None:
         assert one.structure == structure_of(one.sketch.template), one.name
 
 
+def outside_table1(sketch: Sketch) -> bool:
+    """Whether its numbers leave Table 1, by the language's own check; how a count is spelt may be mended."""
+    return any("Rotate2Stmt" not in found.message for found in departures(sketch.template))
+
+
 def test_table1_is_walked_before_what_it_cannot_say_with_as_many_numbers() -> None:
-    every = list(sketches_by_length())
-    assert [one.name for one in every if one.in_table1] == [
-        "ring",
-        "arc",
-        "rings in rings",
-        "lattice",
-        "lattice, 1 guard",
-    ]
-    outside = [one for one in every if not one.in_table1]
-    for one in (one for one in every if one.in_table1):
-        numbers = len({hole.name or hole.path for hole in one.sketch.holes})
-        for other in outside:
-            if len({hole.name or hole.path for hole in other.sketch.holes}) == numbers:
-                assert one.bits < other.bits
-
-
-def test_what_has_a_constant_that_table1_lacks_is_no_part_of_it() -> None:
-    lattice = next(one for one in sketches_by_length() if one.name == "lattice, moved")
-    assert not lattice.in_table1
-    assert departures(lattice.sketch.template)
+    compared = 0
+    for one, other in itertools.permutations(sketches_by_length(), 2):
+        numbers, others = (
+            len({hole.name or hole.path for hole in each.sketch.holes}) for each in (one, other)
+        )
+        if numbers == others and outside_table1(other.sketch) and not outside_table1(one.sketch):
+            compared += 1
+            assert one.bits < other.bits, (one.name, other.name)
+    assert compared > 3
 
 
 def test_rows_and_spirals_have_no_family() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from drawn import DrawnRing
+from ringed import session_on, session_with_ring
 
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.scene import Scene, on_canvas
@@ -17,7 +18,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.curves import CurveFit, curve_score, follow, measured
+from p3i.search.curves import CurveFit
 from p3i.search.evidence import Evidence
 from p3i.search.hybrids import (
     _drawn_once,
@@ -28,11 +29,10 @@ from p3i.search.hybrids import (
 )
 from p3i.search.propose.hybrid import HybridProposal
 from p3i.search.result import NEEDED
-from p3i.search.rings import FoundRing, numbers_of, ring_filling
+from p3i.search.rings import numbers_of
 from p3i.search.session import Session
 
 SCENES = {"concentric": 12, "fan": 9, "row": 14}
-MOVING = ("draw.x.radius.1", "draw.x.offset.1", "draw.y.offset.1")
 PROPOSAL = HybridProposal(
     first=1,
     last=3,
@@ -48,34 +48,11 @@ PROPOSAL = HybridProposal(
 )
 
 
-def session_with_ring(
-    evidence: Evidence, values: dict[str, float], *, count: int, drawn: int | None = None
-) -> Session:
-    """A search that has found this ring, from a start a little off."""
-    session = Session(evidence, SearchConfig(focal_mm=35.0))
-    filling = ring_filling(count, drawn=drawn)
-    off = values | {"camera.rx": values["camera.rx"] + 0.7, "camera.ry": values["camera.ry"] - 0.5}
-    start = measured(evidence, filling, numbers_of(filling, off), focal_mm=35.0)
-    assert start is not None
-    fit = follow(evidence, start, rounds=4)
-    session.rings = (FoundRing(fit, curve_score(fit)),)
-    return session
-
-
 @lru_cache
 def shown(kind: str, seed: int | None = None, *, of: int = 1) -> tuple[Scene, Answer]:
     """The scene of a kind, and the answer from one of its rings, by default the second."""
     scene = hybrid_scene(SCENES[kind] if seed is None else seed, kind=kind)
-    evidence = Evidence(scene.image(), SearchConfig(focal_mm=35.0), 35.0)
-    values = leaves(scene.program)
-    ring = sorted(set(scene.index[:, 0].tolist()))[of]
-    own = {name: values[name] + ring * values[f"{name[:-1]}i"] for name in MOVING} | {
-        name: values[name] for name in ("camera.rx", "camera.ry", "draw.x.angle.1")
-    }
-    count = int((scene.index[:, 0] == ring).sum())
-    own |= {"draw.x.angle.j": values["draw.x.angle.j"]}
-    slots = round(360 / values["draw.x.angle.j"])
-    session = session_with_ring(evidence, own, count=count, drawn=None if count == slots else count)
+    session = session_on(scene, of=of)
     answers = find_hybrids(session)
     assert answers, f"no hybrid in the scene of kind {kind}"
     return scene, answers[0]

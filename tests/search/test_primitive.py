@@ -21,7 +21,7 @@ def fit_of(evidence: Evidence, lattice: Lattice) -> Fit:
     theta = lattice.theta(PATTERN)
     fit = measure(evidence.level_for(side_of_cell(evidence, PATTERN, theta)), PATTERN, theta)
     assert fit is not None
-    return Fit(theta, fit.index, torch.ones(len(fit.index)), fit.areas, fit.score)
+    return Fit(theta, fit.index, torch.ones(len(fit.index)), fit.score)
 
 
 @pytest.mark.parametrize("factors", [[[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]], [[2, 0], [0, 2]]])
@@ -33,9 +33,7 @@ def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]])
     own = index_in(scene).numpy()
     steps = ground.index.numpy() @ factors
     inside = torch.from_numpy(((steps > own.min(0)) & (steps < own.max(0))).all(1))
-    ground = Fit(
-        ground.theta, ground.index[inside], ground.contrast[inside], ground.areas[inside], ground.score
-    )
+    ground = Fit(ground.theta, ground.index[inside], ground.contrast[inside], ground.score)
     found = primitive(evidence_of(scene), PATTERN, ground)
     assert found is not None
     theta, index = found
@@ -102,7 +100,7 @@ def test_the_full_cell_of_a_chequered_floor_stays() -> None:
 def test_too_few_cells_say_nothing() -> None:
     scene = small_scene(16)
     fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
-    few = Fit(fit.theta, fit.index[:3], fit.contrast[:3], fit.areas[:3], fit.score)
+    few = Fit(fit.theta, fit.index[:3], fit.contrast[:3], fit.score)
     assert primitive(evidence_of(scene), PATTERN, few) is None
 
 

@@ -12,7 +12,7 @@ from truth import PATTERN, blank_level, lattice_error, pose_error_deg, turned
 from p3i.search.config import SearchConfig
 from p3i.search.correlate import Instances, find_instances
 from p3i.search.evidence import Evidence
-from p3i.search.lattice import PHASE, Lattice, map_from_index
+from p3i.search.lattice import Lattice, map_from_index
 from p3i.search.robust import fit_instances, robust_fit
 from p3i.vision.image import Image
 
@@ -102,11 +102,9 @@ def instances_from(start: Lattice, *, strays: int = 0) -> Instances:
     return Instances(INDEX, torch.from_numpy(offsets), ones, ones)
 
 
-def fitted(start: Lattice, found: Instances, **options: object) -> Lattice:
+def fitted(start: Lattice, found: Instances) -> Lattice:
     weights = torch.ones(len(INDEX), dtype=torch.float64)
-    theta = fit_instances(
-        blank_level(), PATTERN, start.theta(PATTERN), found, weights=weights, iterations=25, **options
-    )
+    theta = fit_instances(blank_level(), PATTERN, start.theta(PATTERN), found, weights=weights, iterations=25)
     return Lattice.of(PATTERN, theta)
 
 
@@ -123,14 +121,6 @@ def test_a_fifth_of_strays_hardly_moves_the_fit() -> None:
     found = fitted(start, instances_from(start, strays=len(INDEX) // 5))
     assert pose_error_deg(found, TRUTH) < 0.3
     assert lattice_error(found.basis, TRUTH.basis) < 0.01
-
-
-def test_what_is_fixed_stays() -> None:
-    start = turned(TRUTH, rx_deg=2.0)
-    found = fitted(start, instances_from(start), fixed=PHASE | {"camera.rx"})
-    assert found.rx_deg == start.rx_deg
-    assert np.array_equal(found.origin, start.origin)
-    assert not np.array_equal(found.basis, start.basis)
 
 
 @given(

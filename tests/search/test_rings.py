@@ -1,6 +1,7 @@
 """Rings, from the photo to the program: found where there is one, whole or open, and nothing in blotches."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -71,6 +72,15 @@ def test_a_search_whose_time_is_up_fits_nothing_more(monkeypatch: pytest.MonkeyP
     session.stopped = StopReason.TIME_UP
     monkeypatch.setattr(rings, "ring_proposals", lambda evidence, **_: [None] * 3)
     assert find_rings(session) == []
+
+
+def test_a_search_of_another_photo_begins_without_the_rings_of_the_first() -> None:
+    session = Session(RING.evidence(), SearchConfig(focal_mm=35.0))
+    session.rings = ()
+    assert find_rings(session) == []
+    other = replace(session, evidence=Evidence(noise_image(), session.config, 35.0))
+    assert other.rings is None
+    assert session.rings == (), "and the first keeps its own"
 
 
 @pytest.mark.parametrize(("drawn", "slots"), [(9, 14), (8, 12)])

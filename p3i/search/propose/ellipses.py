@@ -39,12 +39,11 @@ _MOST_ELLIPSES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CircleSeed:
-    """A circle that spots may lie on: its pose (degrees), its centre in photo pixels, and how many spots."""
+    """A circle that spots may lie on: its pose (degrees), and its centre in photo pixels."""
 
     rx_deg: float
     ry_deg: float
     center_px: Array
-    spots: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,11 +67,11 @@ def circle_seeds(evidence: Evidence, generator: np.random.Generator) -> list[Cir
     focal_px = Camera(focal_mm=evidence.focal_mm).focal_px(size)
     lens = np.array([[focal_px, 0, size.middle[0]], [0, focal_px, size.middle[1]], [0, 0, 1.0]])
     found: list[CircleSeed] = []
-    for conic, count in _ellipses(spots, max(lab.shape[:2]), generator):
+    for conic in _ellipses(spots, max(lab.shape[:2]), generator):
         to_map = np.linalg.inv(photo_from_map)
         on_photo = to_map.T @ conic @ to_map
         found += [
-            CircleSeed(camera.rx_deg, camera.ry_deg, center, count)
+            CircleSeed(camera.rx_deg, camera.ry_deg, center)
             for camera, center in _circles(on_photo, lens, evidence.focal_mm)
         ]
     return found
@@ -109,7 +108,7 @@ def _spots(lab: NDArray, known: NDArray[np.bool_]) -> _Spots:
     return _Spots(np.stack([x, y], 1).astype(float), np.array(_WIDTHS)[level], colour.astype(float))
 
 
-def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> list[tuple[Array, int]]:
+def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> list[Array]:
     """Ellipses through many spots that are alike, as conics [3, 3] of the map, the most telling first."""
     strength = np.linalg.norm(spots.colour, axis=1)
     cosine = (spots.colour @ spots.colour.T) / np.maximum(strength[:, None] * strength, 1e-9)
@@ -118,7 +117,7 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
     alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_WIDER)
     # Strong spots tell more than weak ones, and many on one ellipse say little where there are many anyway.
     telling = np.sqrt(strength / max(float(strength.max()), 1e-9)) / np.sqrt(np.maximum(alike.sum(1), 1))
-    best: list[tuple[float, int, Array, NDArray]] = []
+    best: list[tuple[float, Array, NDArray]] = []
     for spot in range(len(spots.at)):
         fellows = np.flatnonzero(alike[spot])
         if len(fellows) < _FEWEST:
@@ -135,16 +134,16 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         worth = (counts - misfit) * telling[spot]
         k = int(np.argmax(worth))
         if counts[k] >= _FEWEST:
-            best.append((float(worth[k]), int(counts[k]), conics[k], fellows[on[k]]))
+            best.append((float(worth[k]), conics[k], fellows[on[k]]))
     best.sort(key=lambda one: -one[0])
-    found: list[tuple[Array, int]] = []
+    found: list[Array] = []
     taken: list[set[int]] = []
-    for _, count, conic, members in best:
+    for _, conic, members in best:
         names = set(members.tolist())
         if any(len(names & other) > 0.6 * len(names) for other in taken):
             continue
         taken.append(names)
-        found.append((conic, count))
+        found.append(conic)
         if len(found) >= _MOST_ELLIPSES:
             break
     return found
