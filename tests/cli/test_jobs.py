@@ -106,6 +106,29 @@ def test_ctrl_c_reaches_every_process_of_a_terminal_and_is_one_interrupt(tmp_pat
     assert err == "" and out.count("interrupted before") == 2
 
 
+def test_sigterm_asks_the_processes_too_and_is_the_exit_code(tmp_path: Path) -> None:
+    script = (
+        "import sys\n"
+        "import solvers\n"
+        "from pathlib import Path\n"
+        "from p3i.cli import main, workers\n"
+        "from p3i.cli.solving import Task\n"
+        "from p3i.search.config import SearchConfig\n"
+        "ending = main.Ending()\n"
+        "tasks = [Task(photo=Path(name), config=SearchConfig()) for name in ('a_hangs', 'b_hangs')]\n"
+        "with workers.pool(tasks, jobs=2, traced=False, told=False, solve=solvers.solve,\n"
+        "    prepare=solvers.prepare) as pool:\n"
+        "    print([pool.answer(number, print)[0].error for number in (0, 1)])\n"
+        "sys.exit(ending.code)\n"
+    )
+    with started(script, tmp_path) as process:
+        while not all((tmp_path / f"{name}_hangs.begun").exists() for name in "ab"):
+            time.sleep(0.01)
+        process.terminate()
+        out, err = process.communicate(timeout=20)
+    assert (out, err, process.returncode) == ("['best so far', 'best so far']\n", "", 143)
+
+
 def started(script: str, folder: Path) -> subprocess.Popen[str]:
     """A Python that runs a script in a process group of its own, as a shell starts it."""
     path = os.pathsep.join(map(str, (Path(__file__).parents[1], Path(__file__).parents[2])))
