@@ -18,7 +18,7 @@ from p3i.paint.lens import bent, bent_points, straight_photo
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
-from p3i.paint.placed import FocalSource, camera_of
+from p3i.paint.placed import FAR, FocalSource, camera_of, refuse_edge_on
 from p3i.paint.raster import paint
 from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.sprite import lay, sprite_of
@@ -40,9 +40,6 @@ Path_ = str | PathLike[str]
 
 _DOT_SHARE, _PHOTO_DOT_SHARE = 0.2, 0.11
 """A dot's radius as a share of the spacing; over a photo it should leave the object to be seen."""
-
-_FAR = 1e9
-"""Objects farther from the origin than this, in program units, are not drawn."""
 
 _SPRITE_SHARE = 0.9
 """A sprite's longer side as a share of the spacing."""
@@ -117,7 +114,7 @@ def render(
     program's file, or in the folder `beside`. `changes` are fields of RenderOptions.
 
     Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
-    sketches among them, UsageError for options that cannot be.
+    sketches among them, ProgramError where the plane is seen edge-on, UsageError for options that cannot be.
     """
     options = changed(options or RenderOptions(), changes, verb="render")
     if not isinstance(program, Program):
@@ -126,6 +123,8 @@ def render(
     folder = Path(beside or ".")
     photo = read_image(image) if isinstance(image, str | PathLike) else image
     camera, focal_source = camera_of(program, photo, focal_mm=options.focal_mm)
+    if not options.plane or photo is not None:
+        refuse_edge_on(camera)
 
     pictures = _sprite(program, sprite, folder)
     # Numbers of any size may stand in a program; what overflows around an object is left out.
@@ -177,7 +176,7 @@ class _Objects:
 
 def _objects(program: Program) -> _Objects:
     found = points(program)
-    near = [place for place in found if abs(place[0]) < _FAR and abs(place[1]) < _FAR]
+    near = [place for place in found if abs(place[0]) < FAR and abs(place[1]) < FAR]
     # Coinciding draws are one object: painted twice, what is half transparent would not be.
     kept = [near[place] for place in distinct(near)]
     chart = outlines.chart_of(compile(program))
@@ -272,7 +271,7 @@ def _notes(
                 f"this photo of {photo.size.width} x {photo.size.height}"
             )
     if too_far:
-        notes.append(f"{too_far} objects lie more than {_FAR:g} units away and are not drawn")
+        notes.append(f"{too_far} objects lie more than {FAR:,.0f} units away and are not drawn")
     elif not len(depth):
         notes.append("the program draws nothing")
     if behind := int((depth <= 0).sum()):

@@ -64,8 +64,8 @@ class Objects:
     """The listed objects, row by row; `size` is the photo's, `image` its name, None where there is none.
 
     `outside` and `faint` count the objects that were left out: beyond the photo, and less present than asked;
-    `behind` those that lie behind the camera, which have no place on the photo. `notes` are sentences for the
-    user.
+    `behind` those that lie behind the camera, which have no place on the photo, `placed.far`
+    those too far away. `notes` are sentences for the user.
     """
 
     objects: tuple[Object, ...]
@@ -108,7 +108,7 @@ class Objects:
             text += f": {self.there - unsure} there, {shown - self.there} not"
             text += f", {unsure} not to be judged" if unsure else ""
         left = [(self.outside, "outside the photo"), (self.faint, "less present than asked")]
-        left.append((self.behind, "behind the camera"))
+        left += [(self.behind, "behind the camera"), (self.placed.far, "too far away")]
         dropped = [f"{count} {where}" for count, where in left if count]
         return text + (f" (left out: {', '.join(dropped)})" if dropped else "")
 
