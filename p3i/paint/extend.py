@@ -28,7 +28,7 @@ from p3i.paint.continued import Continued, continued, widened
 from p3i.paint.cutout import cutout
 from p3i.paint.extend_options import SIDES, ExtendOptions, Margins
 from p3i.paint.outlines import chart_of, polygons
-from p3i.paint.picture import Picture, opacity, repainted
+from p3i.paint.picture import Picture, opacity, reframed, repainted
 from p3i.paint.placed import Placed, placed, straight
 from p3i.paint.stack import fill_by_stack
 from p3i.records import changed
@@ -77,12 +77,19 @@ class Extended:
         return self.laid.size
 
     def paint(self) -> Picture:
-        """The picture in the photo's depth; what was transparent in the photo still is."""
+        """The picture in the photo's depth; what was transparent in the photo still is.
+
+        Its EXIF has the focal of the wider view, where it is known and the axis meets the middle.
+        """
         alpha = opacity(self.photo)
         wide = None if alpha is None else np.ones(self.pixels.shape[:2], np.float32)
         if wide is not None:
             wide[_window(self.margins, self.photo.size)] = alpha
-        return repainted(self.photo, self.pixels, alpha=wide)
+        left, top, right, bottom = self.margins
+        focal_mm = self.photo.focal_mm if left == right and top == bottom else None
+        if focal_mm is not None:
+            focal_mm *= self.photo.size.longer / self.size.longer
+        return reframed(repainted(self.photo, self.pixels, alpha=wide), focal_mm=focal_mm)
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""
