@@ -14,7 +14,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
 from p3i.paint import outlines, scene
-from p3i.paint.lens import bent, bent_points, straight_photo
+from p3i.paint.lens import bent, bent_points
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
@@ -135,16 +135,15 @@ def render(
         if photo is not None and options.size is not None and not options.plane:
             photo = scaled(photo, options.size)
         k1 = program.header.lens_k1 if program.header else None
-        if k1 and photo is not None and options.plane:
-            photo = straight_photo(photo, k1)
-        layers = _layers(objects, view, options, photo=photo, pictures=pictures)
+        ground: tuple[scene.Layer, ...] = ()
+        if photo is not None:
+            ground = (scene.Pixels(photo_layer(photo, view, k1=k1)),)
+        layers = ground + _layers(objects, view, options, over_photo=photo is not None, pictures=pictures)
         centers_px, depth = view.project(objects.points)
         if k1 and not options.plane and _canvas(program, options, photo) is not None:
-            ground = layers[:1] if photo is not None else ()  # the photo is bent already
             layers = ground + tuple(bent(layer, view.size, k1) for layer in layers[len(ground) :])
             centers_px, _ = bent_points(centers_px, view.size, k1)
-    ground = layers[0] if photo is not None else None
-    transparent = isinstance(ground, scene.Pixels) and ground.values.shape[2] == 4
+    transparent = any(isinstance(layer, scene.Pixels) and layer.values.shape[2] == 4 for layer in ground)
     return RenderedPicture(
         scene.Scene(view.size, None if transparent else scene.WHITE, layers),
         program,
@@ -191,27 +190,23 @@ def _objects(program: Program) -> _Objects:
 
 
 def _layers(
-    objects: _Objects, view: View, options: RenderOptions, *, photo: Image | None, pictures: Image | None
+    objects: _Objects, view: View, options: RenderOptions, *, over_photo: bool, pictures: Image | None
 ) -> tuple[scene.Layer, ...]:
-    """All that is painted, from the ground up; the photo first, where there is one."""
+    """All that is painted on paper or over a photo, from the ground up."""
     spacing = outlines.pitch(objects.chart)
-    bare = photo is None and pictures is None
+    bare = not over_photo and pictures is None
     layers: list[scene.Layer] = []
-    if photo is not None:
-        layers.append(scene.Pixels(photo_layer(photo, view)))
     if options.cells if options.cells is not None else bare:
         layers += scene.grid(view, outlines.sides(objects.chart, objects.index), over_photo=not bare)
     if pictures is not None:
         units = options.sprite_units or _SPRITE_SHARE * spacing
         layers.append(scene.Pixels(lay(view, [sprite_of(pictures)], objects.points, units=units)))
     if options.horizon:
-        layers += scene.horizon(view, over_photo=photo is not None)
+        layers += scene.horizon(view, over_photo=over_photo)
     if options.markers if options.markers is not None else pictures is None:
         colours = scene.colours_of(objects.index, loops=objects.loops)
-        radius = (_DOT_SHARE if photo is None else _PHOTO_DOT_SHARE) * spacing
-        layers.append(
-            scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=photo is not None)
-        )
+        radius = (_PHOTO_DOT_SHARE if over_photo else _DOT_SHARE) * spacing
+        layers.append(scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=over_photo))
     return tuple(layers)
 
 

@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
-from p3i.interp.lens import straight_from_photo
+from p3i.paint.flat import flat_of
 from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.objects import objects_of
 from p3i.paint.picture import Picture, opacity, repainted
-from p3i.paint.placed import Placed, placed, straight
+from p3i.paint.placed import Placed, placed
 from p3i.paint.points_options import PointsOptions
 from p3i.paint.stack import fill_by_stack
 from p3i.records import changed
 from p3i.vision.image import Image, read_mask
-from p3i.vision.warp import pixel_grid, remapped
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -82,19 +81,15 @@ def inpaint(
     """
     asked: InpaintOptions = changed(options or InpaintOptions(), changes, verb="inpaint")
     hole = hole_from(photo, program, mask=mask, remove=remove, focal_mm=asked.focal_mm)
-    k1 = program.header.lens_k1 if program.header else None
-    if not k1:
-        return _filled(photo, placed(program, photo, focal_mm=asked.focal_mm), hole, asked, progress)
-    # A bent photo is filled where it is straight, and the hole's pixels are brought back.
-    flat = straight(photo, program)
+    flat = flat_of(photo, program, focal_mm=asked.focal_mm)
+    if flat.k1 is None:
+        return _filled(photo, flat.placed, hole, asked, progress)
+    # A bent photo is filled where it is straight, and the hole's pixels are brought back. Around the hole as
+    # much is filled as bringing back mixes in, beyond the photo's edge too.
     wider = np.ones((2 * _LENS_MARGIN_PX + 1,) * 2, np.uint8)
-    marked = dataclasses.replace(photo, pixels=np.repeat(hole[:, :, None], 3, 2).astype(np.float32))
-    flat_hole = cv2.dilate((straight(marked, program).pixels[:, :, 0] > 0).astype(np.uint8), wider) > 0
-    laid = placed(program, flat, focal_mm=asked.focal_mm)
-    found = _filled(flat, laid, flat_hole & flat.valid, asked, progress)
-    at = straight_from_photo(pixel_grid(photo.size), k1, size=photo.size).numpy()
-    bent, _ = remapped(found.pixels, np.ones_like(hole), at)
-    pixels = np.where(hole[:, :, None], bent, photo.pixels)
+    flat_hole = cv2.dilate(flat.marked(hole).astype(np.uint8), wider) > 0
+    found = _filled(flat.photo, flat.placed, flat_hole, asked, progress)
+    pixels = np.where(hole[:, :, None], flat.bent(found.pixels), photo.pixels)
     return dataclasses.replace(found, photo=photo, pixels=pixels, hole=hole)
 
 

@@ -2,7 +2,7 @@
 
 Convention: arrays of float64; points of the plane in program units, points of the photo in pixels, pixel
 centres at whole numbers; matrices map program units to pixels, their third row is the depth (positive in
-front). A photo whose lens bends lines (header key lens_k1) is straightened first: see `straight`.
+front). On a photo whose lens bends lines (header key lens_k1) they lead to pinhole pixels: see flat.py.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import distinct, nest, points
-from p3i.paint.lens import straight_photo
+from p3i.paint.lens import bent_points
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
@@ -37,7 +37,7 @@ class Placed:
 
     `index` [M, 2] int64 and `points` [M, 2] are its objects in program order (coinciding draws are one);
     `image_from_plane` is [3, 3]. Objects at or behind the camera are among them: `centers_px` tells; `far`
-    counts the draws that were left out, beyond FAR.
+    counts the draws that were left out, beyond FAR. `lens_k1` bends the canvas; None where it is straight.
     """
 
     pattern: Pattern
@@ -47,16 +47,26 @@ class Placed:
     index: np.ndarray
     points: np.ndarray
     far: int = 0
+    lens_k1: float | None = None
 
     def centers_px(self) -> tuple[np.ndarray, np.ndarray]:
-        """The objects on the photo: pixels [M, 2], and which lie in front of the camera [M]."""
+        """The objects in pinhole pixels [M, 2], and which lie in front of the camera [M]."""
         return project(self.image_from_plane, self.points)
+
+    def shown_px(self) -> tuple[np.ndarray, np.ndarray]:
+        """The objects where the lens shows them: pixels [M, 2], and which it shows [M]."""
+        pixels, front = self.centers_px()
+        if self.lens_k1 is None:
+            return pixels, front
+        pixels, shown = bent_points(np.where(front[:, None], pixels, np.nan), self.size, self.lens_k1)
+        return pixels, front & shown
 
     def in_sight(self) -> np.ndarray:
         """Which objects [M] lie on the photo."""
-        pixels, front = self.centers_px()
+        pixels, front = self.shown_px()
         limits = np.array([self.size.width, self.size.height]) - 0.5
-        return front & (pixels >= -0.5).all(1) & (pixels <= limits).all(1)
+        with np.errstate(invalid="ignore"):
+            return front & (pixels >= -0.5).all(1) & (pixels <= limits).all(1)
 
     def at(self, index: np.ndarray) -> np.ndarray:
         """The plane points [K, 2] of any (i, j) [K, 2], drawn or not, fractions too."""
@@ -114,6 +124,7 @@ def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> 
         np.array([place[2:] for place in kept], np.int64).reshape(-1, 2),
         np.array([place[:2] for place in kept], float).reshape(-1, 2),
         len(drawn) - len(found),
+        (program.header.lens_k1 if program.header else None) or None,
     )
     if not len(kept) or not result.centers_px()[1].any():
         raise ProgramError("the program draws nothing in front of its camera: `p3i check` says where it does")
@@ -142,9 +153,3 @@ def _refuse_overflow(laid: Placed) -> None:
                     f"one step of the loop over {'ij'[axis]} goes farther than {FAR:,.0f} units, "
                     "ten thousand pictures: write smaller numbers in Draw"
                 )
-
-
-def straight(photo: Image, program: Program) -> Image:
-    """The photo as a pinhole camera would show it: itself, unless the program's header names a lens_k1."""
-    k1 = program.header.lens_k1 if program.header else None
-    return straight_photo(photo, k1) if k1 else photo
