@@ -126,7 +126,7 @@ def render(
     if not options.plane or photo is not None:
         refuse_edge_on(camera)
 
-    pictures = _sprite(program, sprite, folder)
+    pictures = _sprite(program, sprite, folder, allow_outside=options.allow_outside)
     # Numbers of any size may stand in a program; what overflows around an object is left out.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         objects = _objects(program)
@@ -238,8 +238,13 @@ def _view(
     return view
 
 
-def _sprite(program: Program, sprite: Path_ | Image | None, folder: Path) -> Image | None:
-    """The picture that stands at the objects: the one given, else the one that `Draw` names."""
+def _sprite(
+    program: Program, sprite: Path_ | Image | None, folder: Path, *, allow_outside: bool
+) -> Image | None:
+    """The picture that stands at the objects: the one given, else the one that `Draw` names.
+
+    A program may come from anybody: what it names is read from below its folder only, links followed.
+    """
     if isinstance(sprite, Image):
         return sprite
     if sprite is not None:
@@ -248,7 +253,17 @@ def _sprite(program: Program, sprite: Path_ | Image | None, folder: Path) -> Ima
     if named is None:
         return None
     try:
-        return read_image(folder / named)
+        place = (folder / named).resolve()
+        if not allow_outside and not place.is_relative_to(folder.resolve()):
+            raise FileError(
+                f"{named} lies outside the program's folder; --allow-outside reads it all the same "
+                "(allow_outside in Python)"
+            )
+        if place.exists() and not place.is_file():
+            raise FileError(f"{named} is no file with a picture")  # a pipe would be waited for, for ever
+        return read_image(place)
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a name that no system takes
+        raise FileError(f"the picture of Draw(...): {named} cannot be found: {error}") from None
     except FileError as error:
         raise FileError(f"the picture of Draw(...): {error}") from None
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
+from p3i.paint.filled import Filled, share_text
 from p3i.paint.flat import flat_of
 from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.objects import objects_of
@@ -37,16 +38,18 @@ _LENS_MARGIN_PX = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inpainted:
-    """A photo with its `hole` [H, W] filled: `pixels` float32 [H, W, 3]; `notes` are sentences for the user.
+    """A photo with its `hole` [H, W] filled by `method`: `pixels` float32 [H, W, 3].
 
-    `unlike` is the share of the hole for which the program knows nothing like it: there the surroundings were
-    continued.
+    `unlike` is the share of the hole for which the program knows nothing like it; `fallback` the share that
+    something simpler than the method filled, that one included. `notes` are sentences for the user.
     """
 
     photo: Image
     pixels: Floats
     hole: Mask
+    method: str
     unlike: float
+    fallback: float
     notes: tuple[str, ...] = ()
 
     def paint(self) -> Picture:
@@ -58,6 +61,17 @@ class Inpainted:
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""
         self.paint().save(path, kind=kind, force=force)
+
+    def record(self) -> dict[str, Any]:
+        """The facts as plain JSON values, the same for all methods; docs/inpaint.md says what each means."""
+        return {
+            "photo": [self.photo.size.width, self.photo.size.height],
+            "method": self.method,
+            "filled": int(self.hole.sum()),
+            "unlike": round(self.unlike, 4),
+            "fallback": round(self.fallback, 4),
+            "notes": list(self.notes),
+        }
 
 
 def inpaint(
@@ -155,39 +169,43 @@ def _filled(
 ) -> Inpainted:
     """The hole of a straight photo filled by the method asked for."""
     notes: list[str] = []
-    if not (laid.in_sight()).any():
-        notes.append("no object of the program lies on the photo: the surroundings are continued")
-    unlike = 0.0
+    if not laid.in_sight().any():
+        notes.append("no object of the program lies on the photo: it shows nothing to fill the hole from")
     match options.method:
         case "npn":
-            from p3i.paint.npn.options import NetworkOptions
-            from p3i.paint.npn.paint import paint
-
-            network = NetworkOptions(
-                steps=options.steps,
-                time_s=options.time_s,
-                checkpoint=options.checkpoint,
-                seed=options.seed,
-                device=options.device,
-                threads=options.threads,
-            )
-
-            def told(step: int, steps: int, _misfit: float) -> None:
-                if progress is not None:
-                    progress("training", step / steps)
-
-            pixels = paint(photo, laid, hole, network, progress=told)
+            found = _by_network(photo, laid, hole, options, progress)
         case "patchmatch":
             from p3i.paint.patchmatch import fill_by_patchmatch
 
-            pixels = fill_by_patchmatch(photo.pixels, photo.valid, hole, laid, seed=options.seed)
-            if laid.basis is None:
-                notes.append("patchmatch is guided by lattices only: here it fills unguided")
+            found = fill_by_patchmatch(photo.pixels, photo.valid, hole, laid, seed=options.seed)
         case _:
             pixels, bare = fill_by_stack(photo.pixels, photo.valid, hole, laid, progress=progress)
-            unlike = float(bare.sum() / hole.sum())
-    if unlike >= 0.01:
-        notes.append(
-            f"for {unlike:.0%} of the hole the program has nothing like it: the surroundings are continued"
-        )
-    return Inpainted(photo, pixels, hole, unlike, tuple(notes))
+            part = share_text(bare, hole)
+            said = [f"for {part} the program has nothing like it: the surroundings are continued"] * bool(
+                part
+            )
+            found = Filled(pixels, bare, bare, tuple(said))
+    unlike, fallback = (float(part.sum() / hole.sum()) for part in (found.unlike, found.fallback))
+    return Inpainted(photo, found.pixels, hole, options.method, unlike, fallback, (*notes, *found.notes))
+
+
+def _by_network(
+    photo: Image, laid: Placed, hole: Mask, options: InpaintOptions, progress: Progress | None
+) -> Filled:
+    from p3i.paint.npn.options import NetworkOptions
+    from p3i.paint.npn.paint import paint
+
+    network = NetworkOptions(
+        steps=options.steps,
+        time_s=options.time_s,
+        checkpoint=options.checkpoint,
+        seed=options.seed,
+        device=options.device,
+        threads=options.threads,
+    )
+
+    def told(step: int, steps: int, _misfit: float) -> None:
+        if progress is not None:
+            progress("training", step / steps)
+
+    return paint(photo, laid, hole, network, progress=told)

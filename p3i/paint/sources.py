@@ -7,6 +7,7 @@ and Kanade, IJCAI 1981), its light is matched, and its misfit tells how far to b
 Convention: points are pixels of the photo [N, 2]; colours RGB in 0..1.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -132,6 +133,24 @@ def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIE
     """
     if not len(hole.around):
         return []
+    found = [_aligned(hole, ground, matrix) for matrix in _laid_on(hole, ground, placed, most=most)]
+    alike = sorted((one for one in found if one is not None), key=lambda source: source.misfit)
+    return [one for one in alike if one.misfit <= _WORSE * alike[0].misfit + _WORSE_ANYWAY][:_MOST_KEPT]
+
+
+def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> Mask:
+    """Which of a hole's pixels [N] the photo knows on the ground of one of the `most` nearest objects."""
+    shown = np.zeros(len(hole.points), bool)
+    for matrix in _laid_on(hole, ground, placed, most=most):
+        at, front = project(matrix, hole.points)
+        shown |= front & ground.known(at)
+        if shown.all():
+            break
+    return shown
+
+
+def _laid_on(hole: Hole, ground: Ground, placed: Placed, *, most: int) -> Iterator[Array]:
+    """The photo's matrices [3, 3] that take the hole to its like on other drawn ground, the nearest first."""
     pixels, _ = placed.centers_px()
     away = np.hypot(*(pixels - pixels[hole.target]).T)
     plane_moves = moves(placed, hole.target)
@@ -145,18 +164,13 @@ def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIE
     probes, _ = project(plane_from_image, probes)
     spacing = _spacing(placed, hole.target)
     drawn = _apart(placed, probes) <= _GROUND * spacing
-    found: list[Source] = []
     for number in tried:
         moved, _ = project(plane_moves[number], probes)
         scale = np.sqrt(abs(np.linalg.det(plane_moves[number][:2, :2])))
         on_ground = _apart(placed, moved) <= _GROUND * spacing * scale
         if (on_ground | ~drawn).mean() < _LEAST_ON_GROUND:
             continue
-        source = _aligned(hole, ground, placed.image_from_plane @ plane_moves[number] @ plane_from_image)
-        if source is not None:
-            found.append(source)
-    found.sort(key=lambda source: source.misfit)
-    return [one for one in found if one.misfit <= _WORSE * found[0].misfit + _WORSE_ANYWAY][:_MOST_KEPT]
+        yield placed.image_from_plane @ plane_moves[number] @ plane_from_image
 
 
 def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:

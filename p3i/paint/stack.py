@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from p3i.paint.cells import nearest
 from p3i.paint.matching import carried, trusted
 from p3i.paint.placed import Placed
-from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, sources
+from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, shown_elsewhere, sources
 from p3i.vision.fill import fill_in
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
@@ -68,6 +68,17 @@ def fill_by_stack(
     if bare.any():
         fill_in(result, context, bare)
     return result, bare
+
+
+def unlike(pixels: Floats, known: Mask, hole: Mask, placed: Placed) -> Mask:
+    """Where a hole [H, W] is like nothing that the program shows elsewhere on the photo: [H, W]."""
+    known = known & ~hole
+    ground = Ground.of(pixels, known)
+    found = np.zeros_like(hole)
+    for points in _pieces(hole, known, placed):
+        columns, rows = points.astype(int).T
+        found[rows, columns] = ~shown_elsewhere(hole_of(points, pixels, known, placed), ground, placed)
+    return found
 
 
 def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
