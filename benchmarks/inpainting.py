@@ -5,10 +5,10 @@ python benchmarks/inpainting.py PHOTOS --methods stack telea --every 3
 python benchmarks/inpainting.py PHOTOS --methods npn --steps 400 --out rows.jsonl
 
 On each lattice photo 1, 2 and 4 whole cells of the annotation and a box of 1.2 cells are hidden, at places
-drawn from the seed, and only then, all of them unknown, the program is searched for. Photos on which it is not
-within tolerance of the annotation (the same lattice, its pose within 2 degrees) are counted and left out. What
-each way puts into each hole, the others in sight, is compared with the photo: mean L1 (0 to 255), PSNR and SSIM
-over the hole, CPU seconds.
+drawn from the seed, and only then, all of them unknown, the program is searched for. Photos on which it is
+not within tolerance of the annotation (the same lattice, its pose within 2 degrees) are counted and left out.
+What each way puts into each hole, the others in sight, is compared with the photo: mean L1 (0 to 255), PSNR
+and SSIM over the hole, CPU seconds.
 Needs pypatchmatch (extra `patchmatch`) and scikit-image (extra `bench`).
 """
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.cells import moves, nearest, pitch_px
-from p3i.paint.matching import matched_light, shift_step
+from p3i.paint.matching import aligned
 from p3i.paint.placed import Placed
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
@@ -44,7 +44,6 @@ _LEAST_ON_GROUND = 0.6
 _PROBES = 400
 # Shifts reach this far, in distances to the next object.
 _MOST_SHIFT = 0.12
-_SHIFTS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,24 +181,15 @@ def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
     weights = hole.weights * (front & ground.known(at))
     if (weights > 0).mean() < _LEAST_AROUND:
         return None
-    best: Source | None = None
-    shift, most = np.zeros(2), _MOST_SHIFT * hole.spacing_px
-    for left in range(_SHIFTS, -1, -1):
-        colours = taken(ground.pixels, at + shift)
-        gain, offset = matched_light(colours, hole.colours, weights)
-        residual = hole.colours - (gain * colours + offset)
-        misfit = float((weights[:, None] * np.abs(residual)).sum() / weights.sum() / 3)
-        if best is None or misfit < best.misfit:
-            best = Source(from_hole, shift.copy(), gain, offset, misfit)
-        if not left:
-            break
-        slopes = [
-            gain * (taken(ground.pixels, at + shift + half) - taken(ground.pixels, at + shift - half))
-            for half in np.array([(0.5, 0.0), (0.0, 0.5)])
-        ]
-        step = shift_step(slopes, residual, weights)
-        shift = np.clip(shift + step, -most, most)
-    return best
+
+    def read(shift: Array) -> Floats:
+        return taken(ground.pixels, at + shift)
+
+    def slopes(shift: Array) -> list[Floats]:
+        return [read(shift + half) - read(shift - half) for half in np.array([(0.5, 0.0), (0.0, 0.5)])]
+
+    most_px = _MOST_SHIFT * hole.spacing_px
+    return Source(from_hole, *aligned(read, slopes, hole.colours, weights, most_px=most_px))
 
 
 def _spacing(placed: Placed, target: int) -> float:
