@@ -116,7 +116,7 @@ def _project(placed: Placed, point: np.ndarray) -> np.ndarray:
 
 
 def _unproject(placed: Placed, pixels: np.ndarray) -> np.ndarray:
-    """Pinhole pixels [M, 2] to plane points [M, 2]."""
+    """Pinhole pixels [K, 2] to plane points [K, 2]."""
     mapped = np.c_[pixels, np.ones(len(pixels))] @ np.linalg.inv(placed.image_from_plane).T
     return mapped[:, :2] / mapped[:, 2:]
 
@@ -133,7 +133,7 @@ def _finest(placed: Placed, linear: np.ndarray, point: np.ndarray) -> float:
 def _ground(
     placed: Placed, linear: np.ndarray, middle: np.ndarray, *, farthest: float, k1: float | None
 ) -> tuple[np.ndarray, bool]:
-    """The outline [M, 2], in upright units, of what the photo shows up to `farthest`; whether that cut it."""
+    """The outline [K, 2], in upright units, of what the photo shows up to `farthest`; whether that cut it."""
     size = placed.size
     along = np.linspace(0, 1, 33)[:-1]
     corners = np.array([(0, 0), (size.width, 0), (size.width, size.height), (0, size.height)]) - 0.5

@@ -1,7 +1,7 @@
 """The light over a pattern: one smooth gain that makes its cells alike.
 
-Convention: `samples` [K, N, 3] are the same N places of K patches, in 0..1, `seen` [K, N] which are known,
-`points` [K, N, 2] where they lie on the plane. The gain is the exponential of a polynomial in the plane's
+Convention: `samples` [L, K, 3] are the same K places of L patches, in 0..1, `seen` [L, K] which are known,
+`points` [L, K, 2] where they lie on the plane. The gain is the exponential of a polynomial in the plane's
 coordinates, one a channel; dividing by it gives the pattern in even light. Cells that were painted darker on
 one side stay so: only what changes from cell to cell is light.
 """

@@ -36,7 +36,7 @@ class Chart:
     axes: tuple[int, int]
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """The points [M, 2] at `place` [M, 4]."""
+        """The points [K, 2] at `place` [K, 4]."""
         middle, sideways = _points(self.pattern, place[:, :2]), place[:, 2:]
         match self.axes:
             case (0, 1):
@@ -179,7 +179,7 @@ def _orientations(pattern: Pattern, index: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _step(pattern: Pattern, index: np.ndarray, variable: int) -> np.ndarray:
-    """How far the point moves from half a step before to half a step after: [M, 2]."""
+    """How far the point moves from half a step before to half a step after: [K, 2]."""
     half = np.zeros(2)
     half[variable] = 0.5
     return _points(pattern, index + half) - _points(pattern, index - half)

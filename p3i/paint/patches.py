@@ -95,7 +95,7 @@ def in_photo(
 
 
 def finest(placed: Placed, points: np.ndarray) -> float:
-    """Photo pixels in a program unit at the plane points [M, 2], where and in the direction they are most."""
+    """Photo pixels in a program unit at the plane points [K, 2], where and in the direction they are most."""
     h = placed.image_from_plane
     mapped = points @ h[:, :2].T + h[:, 2]
     at = mapped[:, :2] / mapped[:, 2:]

@@ -4,7 +4,7 @@ A source is the ground of another object, brought over by the program's own move
 source and photo show the same, so there the source is shifted by the little that the program is off (Lucas
 and Kanade, IJCAI 1981), its light is matched, and its misfit tells how far to believe it inside.
 
-Convention: points are pixels of the photo [N, 2]; colours RGB in 0..1.
+Convention: points are pixels of the photo [L, 2]; colours RGB in 0..1.
 """
 
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ _MOST_SHIFT = 0.12
 class Hole:
     """One piece of what is to be filled, seen from the object `target` in its middle.
 
-    `points` [N, 2] are its pixels; `around` [K, 2] pixels beside it, with `weights` [K] by nearness and the
+    `points` [L, 2] are its pixels; `around` [K, 2] pixels beside it, with `weights` [K] by nearness and the
     `colours` [K, 3] that the photo has there. `spacing_px` is how far the next object lies.
     """
 
@@ -76,7 +76,7 @@ class Source:
     misfit: float
 
     def where(self, points: Array) -> tuple[Array, Mask]:
-        """The points [N, 2] like these, and which lie in front of the camera."""
+        """The points [L, 2] like these, and which lie in front of the camera."""
         at, front = project(self.from_hole, points)
         return at + self.shift_px, front
 
@@ -95,7 +95,7 @@ class Ground:
         return cls(pixels, cv2.erode(padded, np.ones((3, 3), np.uint8))[1:-1, 1:-1].astype(np.float32))
 
     def known(self, points: Array) -> Mask:
-        """Which of the points [N, 2] can be read."""
+        """Which of the points [L, 2] can be read."""
         height, width = self.sure.shape
         x, y = points[:, 0], points[:, 1]
         inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
@@ -103,7 +103,7 @@ class Ground:
 
 
 def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed) -> Hole:
-    """A piece of the hole, its pixels [N, 2], with its surroundings: what is `known` [H, W] of `shown`."""
+    """A piece of the hole, its pixels [L, 2], with its surroundings: what is `known` [H, W] of `shown`."""
     pixels, front = placed.centers_px()
     away = np.hypot(*(pixels - points.mean(0)).T)
     target = int(np.argmin(np.where(front, away, np.inf)))
@@ -138,7 +138,7 @@ def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIE
 
 
 def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> Mask:
-    """Which of a hole's pixels [N] the photo knows on the ground of one of the `most` nearest objects."""
+    """Which of a hole's pixels [L] the photo knows on the ground of one of the `most` nearest objects."""
     shown = np.zeros(len(hole.points), bool)
     for matrix in _laid_on(hole, ground, placed, most=most):
         at, front = project(matrix, hole.points)

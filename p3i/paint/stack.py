@@ -81,7 +81,7 @@ def unlike(pixels: Floats, known: Mask, hole: Mask, placed: Placed) -> Mask:
 
 
 def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
-    """The hole piece by piece, pixels [N, 2] each: what hangs together, in blocks where it is large.
+    """The hole piece by piece, pixels [L, 2] each: what hangs together, in blocks where it is large.
 
     The blocks of a large piece come from its rim inwards, so that each has something beside it.
     """
@@ -115,7 +115,7 @@ def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
 def _filled(
     hole: Hole, ground: Ground, found: list[Source], shown: Floats, before: Mask
 ) -> tuple[Floats, Mask]:
-    """The colours of a hole's pixels [N, 3], and which of them any source shows [N]."""
+    """The colours of a hole's pixels [L, 3], and which of them any source shows [L]."""
     if not found:
         return np.zeros((len(hole.points), 3), np.float32), np.zeros(len(hole.points), bool)
     weights = _weights(hole, ground, found)
@@ -137,7 +137,7 @@ def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
 def _mixed(
     points: Array, ground: Ground, found: list[Source], weights: Array, *, sharp: bool
 ) -> tuple[Floats, Array]:
-    """The sources' colours at the hole's points, mixed [N, 3], and the weight of those that show them [N]."""
+    """The sources' colours at the hole's points, mixed [L, 3], and the weight of those that show them [L]."""
     total, weight = np.zeros((len(points), 3)), np.zeros(len(points))
     for source, share in zip(found, weights, strict=True):
         if share < 1e-4:
@@ -152,7 +152,7 @@ def _mixed(
 def _carried(
     hole: Hole, ground: Ground, found: list[Source], weights: Array, shown: Floats, before: Mask
 ) -> Floats:
-    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [N, 3].
+    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [L, 3].
 
     The rim is of the photo, and of what was filled `before` [H, W]; both are in `shown` [H, W, 3].
     """

@@ -112,7 +112,7 @@ def clip_to_canvas(segments: np.ndarray, size: Size) -> np.ndarray:
 
 
 def _window(points: np.ndarray, size: Size | None, longer: int) -> tuple[Size, np.ndarray]:
-    """A canvas that shows all `points` [M, 2], and the similarity to its pixels [3, 3]."""
+    """A canvas that shows all `points` [K, 2], and the similarity to its pixels [3, 3]."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 1e-3 * max(1e-6, float((high - low).max())))
     if size is None:

@@ -159,15 +159,6 @@ def test_an_object_that_is_not_there_is_refused_with_those_that_are() -> None:
         inpaint(drawn(LATTICE), loads(LATTICE), remove=["Z9"])
 
 
-def test_a_bent_photo_is_filled_where_it_is_straight() -> None:
-    header = "# /// p3p\n# version = 1\n# lens_k1 = -0.05\n# ///\n"
-    photo = drawn(LATTICE)
-    hole = cell_hole(photo, LATTICE, 31)
-    found = inpaint(photo, loads(header + LATTICE), mask=hole)
-    assert np.array_equal(found.pixels[~hole], photo.pixels[~hole])
-    assert np.abs(found.pixels - photo.pixels)[hole].mean() * 255 < 25
-
-
 def test_moves_lay_each_object_on_each_other() -> None:
     for text in (LATTICE, RING):
         laid = placed(loads(text), drawn(text))

@@ -97,9 +97,9 @@ def _change(
     options: NetworkOptions,
     turn: _Turn,
 ) -> "np.ndarray | Literal['untaught', 'useless']":
-    """What the network adds [P, 3] to the stack's fill of one part of the hole, or why it adds nothing.
+    """What the network adds [L, 3] to the stack's fill of one part of the hole, or why it adds nothing.
 
-    `piece`: the part, bool [H, W], and the colours [P, 3] that the stack has filled it with.
+    `piece`: the part, bool [H, W], and the colours [L, 3] that the stack has filled it with.
     """
     part, filled = piece
     window = window_of(placed, part, working_px=options.working_px)
@@ -170,7 +170,7 @@ def part_on_window(part: np.ndarray, window: Window) -> np.ndarray:
 
 
 def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.ndarray:
-    """The colours [P, 3] of one part's pixels, at the photo's size, from what was said on the window's.
+    """The colours [L, 3] of one part's pixels, at the photo's size, from what was said on the window's.
 
     Attention, strength, membranes and correction are smooth enough to be magnified; the sources are read
     anew, so that detail finer than the window's is kept.
@@ -181,7 +181,7 @@ def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.n
     core = (places - [window.core[1].start, window.core[0].start]).astype(np.float32)
 
     def magnified(planes: np.ndarray) -> np.ndarray:
-        """[C, h, w] read at the hole's pixels: [P, C]."""
+        """[C, h, w] read at the hole's pixels: [L, C]."""
         return np.stack([taken(np.ascontiguousarray(plane), core) for plane in planes], axis=1)
 
     attention = magnified(said.attention[0, :, 0].cpu().numpy())
