@@ -104,6 +104,7 @@ def render(
     image: Path_ | Image | None = None,
     sprite: Path_ | Image | None = None,
     beside: Path_ | None = None,
+    named_pictures: bool = True,
     **changes: Any,
 ) -> RenderedPicture:
     """Draw a program: dots coloured by loop index, cells, horizon, or a picture at each object.
@@ -111,7 +112,8 @@ def render(
     `program` may be a file, also a PNG or SVG that was drawn here before. With `image` the drawing goes over
     that photo; with `plane` the plane is seen straight on (and the photo straightened). `sprite` stands at
     every object, flat on the plane, and wins over the picture named in `Draw`, which is looked up beside the
-    program's file, or in the folder `beside`. `changes` are fields of RenderOptions.
+    program's file, or in the folder `beside`, unless `named_pictures` is False. `changes` are fields of
+    RenderOptions.
 
     Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
     sketches among them, ProgramError where the plane is seen edge-on, UsageError for options that cannot be.
@@ -126,7 +128,9 @@ def render(
     if not options.plane or photo is not None:
         refuse_edge_on(camera)
 
-    pictures = _sprite(program, sprite, folder, allow_outside=options.allow_outside)
+    pictures = None
+    if named_pictures or sprite is not None:
+        pictures = _sprite(program, sprite, folder, allow_outside=options.allow_outside)
     # Numbers of any size may stand in a program; what overflows around an object is left out.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         objects = _objects(program)
