@@ -99,7 +99,7 @@ def covered(placed: Placed, cut: Cutout) -> Mask:
     return mask
 
 
-def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask, cut: Cutout) -> Floats:
+def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask) -> Floats:
     """The photo with the ground continued under `objects` [H, W]: float32 [H, W, 3]."""
     ground = valid & ~objects
     if not ground.any():

@@ -134,7 +134,7 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
     notes += _doubts(cut)
     own = _mask(_only(laid, old_place), cut)
     removed = covered(_only(laid, gone), cut) & (own < 0.02) & photo.valid
-    ground = cleared(photo.pixels, photo.valid, laid, covered(laid, cut), cut)
+    ground = cleared(photo.pixels, photo.valid, laid, covered(laid, cut))
     pixels = np.where(removed[:, :, None], ground, photo.pixels)
     scale = options.scale
     if scale is None:

@@ -145,7 +145,7 @@ def extend(
     pixels, known, shown = _laid_out(flat, sides, size)
     alpha = _alpha(photo, known, shown, sides) if flat.k1 is None else _alpha(None, known, shown, sides)
     hole = ~shown
-    pattern = hole & _ground(wide, len(laid.index), more)
+    pattern = hole & _ground(wide)
     bare = hole & ~pattern
     left_over = pattern
     for _ in range(_ROUNDS):
@@ -248,7 +248,7 @@ def _wider(laid: Placed, more: Continued, sides: Sides, size: Size) -> Placed:
     )
 
 
-def _ground(wide: Placed, own: int, more: Continued) -> Mask:
+def _ground(wide: Placed) -> Mask:
     """The pixels of the new picture that lie in a cell: bool [H, W]."""
     cells, front = project(wide.image_from_plane, polygons(chart_of(wide.pattern), wide.index))
     ground = np.zeros((wide.size.height, wide.size.width), np.uint8)

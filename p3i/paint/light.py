@@ -32,7 +32,7 @@ class Light:
         return np.exp(np.clip(log_gain, -_MOST_LOG_GAIN, _MOST_LOG_GAIN))
 
 
-def even(points: np.ndarray) -> Light:
+def even() -> Light:
     """No light to remove."""
     return Light(np.zeros((0, 3)), np.zeros(2), 1.0)
 
@@ -45,7 +45,7 @@ def fitted_light(samples: np.ndarray, seen: np.ndarray, points: np.ndarray) -> L
     count = len(samples)
     terms = 5 if count >= 8 else 2 if count >= 3 else 0
     if not terms:
-        return even(points)
+        return even()
     middle = points[seen].mean(axis=0)
     radius = max(1e-9, float(np.abs(points[seen] - middle).max()))
     logs = np.log(samples + _DARK)
