@@ -8,7 +8,7 @@ import click
 
 from p3i import api
 from p3i.cli import grouped, options, progress
-from p3i.cli.pictures import Outputs, kind_option
+from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.errors import UsageError
 from p3i.paint.inpaint_options import METHODS, InpaintOptions
 from p3i.records import told
@@ -27,6 +27,7 @@ sentence, default = told(InpaintOptions)
 )
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option
+@json_option
 @options.force
 @options.field(InpaintOptions, "method", type=click.Choice(METHODS))
 @options.field(InpaintOptions, "steps", type=int, metavar="N")
@@ -53,13 +54,13 @@ def command(**given: Any) -> None:
     photo, program, mask = given["photo"], given["program"], given["mask"]
     if [photo, program, mask].count("-") > 1:
         raise UsageError("only one input can be standard input")
-    outputs = Outputs.of({**given, "json_to": None}, inputs=(photo, program, mask))
+    outputs = Outputs.of(given, inputs=(photo, program, mask))
     with progress.bar(photo, wanted=not given["quiet"]) as update:
         found = api.inpaint(photo, program, asked, mask=mask, remove=given["remove"], progress=update)
     outputs.say((*found.photo.notes, *found.notes), name=photo)
     if outputs.kind in ("jpg", "webp"):
         kind = outputs.kind.upper()
         outputs.say([f"{kind} stores every pixel anew: write PNG or TIFF to keep the others"], name=photo)
-    outputs.write(found.paint(), {}, name=photo)
+    outputs.write(found.paint(), found.record(), name=photo)
     if given["verbose"]:
         outputs.say([f"{int(found.hole.sum()):,} pixels filled"], name=photo, kind="info")

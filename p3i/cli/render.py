@@ -72,6 +72,9 @@ class SizeType(click.ParamType):
     default=default("horizon"),
     help=sentence("horizon"),
 )
+@click.option(
+    "--allow-outside", is_flag=True, default=default("allow_outside"), help=sentence("allow_outside")
+)
 @options.focal(RenderOptions)
 @options.max_px(RenderOptions)
 @click.option("--watch", is_flag=True, help="Draw again whenever a file that was read changes, until Ctrl-C.")

@@ -62,7 +62,7 @@ def windows(placed: Placed, cut: Cutout, *, scale: float = 1.0) -> list[tuple[sl
 
 
 def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> Array:
-    """Where the pixels of a window lie about an object, in program units: [N, 2], row by row."""
+    """Where the pixels of a window lie about an object, in program units: [K, 2], row by row."""
     rows, columns = np.mgrid[window]
     pixels = np.stack([columns.ravel(), rows.ravel()], 1).astype(float)
     points, _ = project(np.linalg.inv(placed.image_from_plane), pixels)
@@ -99,7 +99,7 @@ def covered(placed: Placed, cut: Cutout) -> Mask:
     return mask
 
 
-def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask, cut: Cutout) -> Floats:
+def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask) -> Floats:
     """The photo with the ground continued under `objects` [H, W]: float32 [H, W, 3]."""
     ground = valid & ~objects
     if not ground.any():

@@ -1,4 +1,4 @@
-"""Outlines cut off: before the camera, and at the edge of the photo.
+"""Lines and outlines cut off by half-planes: before the camera, and at the edge of the photo.
 
 Convention: polygons are corners [K, 2] in order, not closed; one that vanishes is [0, 2].
 """
@@ -14,14 +14,14 @@ _NEAR = 0.02
 def cut_before_camera(polygon: np.ndarray, image_from_plane: np.ndarray) -> np.ndarray:
     """The part of a polygon of the plane that lies in front of the camera."""
     depth = polygon @ image_from_plane[2, :2] + image_from_plane[2, 2]
-    return _kept(polygon, depth - _NEAR * image_from_plane[2, 2])
+    return cut_polygon(polygon, depth - _NEAR * image_from_plane[2, 2])
 
 
 def clipped_to_canvas(polygon: np.ndarray, size: Size) -> np.ndarray:
     """The part of a polygon (pixels) that lies on the photo, out to the edge of its outermost pixels."""
     for axis, last in ((0, size.width - 1), (1, size.height - 1)):
-        polygon = _kept(polygon, polygon[:, axis] + 0.5)
-        polygon = _kept(polygon, last + 0.5 - polygon[:, axis])
+        polygon = cut_polygon(polygon, polygon[:, axis] + 0.5)
+        polygon = cut_polygon(polygon, last + 0.5 - polygon[:, axis])
     return polygon if len(polygon) >= 3 and area(polygon) > 1e-6 else np.zeros((0, 2))
 
 
@@ -40,16 +40,28 @@ def area(polygon: np.ndarray) -> float:
     return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
 
 
-def _kept(polygon: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """The part of a polygon where a linear function, `inside` [K] at its corners, is >= 0."""
+def cut(segments: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The parts of segments [S, 2, D] where a linear function is >= 0, and which have such a part [S].
+
+    `inside` [S, 2] is the function at their ends; it must be finite for a part to be kept.
+    """
+    kept = np.asarray((inside >= 0).any(axis=1) & np.isfinite(inside).all(axis=1))
+    segments, inside = segments[kept], inside[kept]
+    first, second = inside[:, :1], inside[:, 1:]
+    gap = np.where(first == second, 1, first - second)
+    crossing = segments[:, 0] + (first / gap) * (segments[:, 1] - segments[:, 0])
+    ends = [np.where(inside[:, end : end + 1] >= 0, segments[:, end], crossing) for end in (0, 1)]
+    return np.stack(ends, axis=1), kept
+
+
+def cut_polygon(polygon: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """The part of a polygon [K, 2] where a linear function, `inside` [K] at its corners, is >= 0."""
     if (inside >= 0).all():
         return polygon
-    corners = []
-    for here, after, value, following in zip(
-        polygon, np.roll(polygon, -1, axis=0), inside, np.roll(inside, -1), strict=True
-    ):
-        if value >= 0:
-            corners.append(here)
-        if (value >= 0) != (following >= 0):
-            corners.append(here + value / (value - following) * (after - here))
-    return np.array(corners).reshape(-1, 2)
+    values = np.stack([inside, np.roll(inside, -1)], axis=1)
+    sides, kept = cut(np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1), values)
+    # Each side that is left begins with a corner; one that leaves the half-plane ends with another.
+    leaving = values[kept][:, 1] < 0
+    corners = np.repeat(sides[:, 0], 1 + leaving, axis=0)
+    corners[np.cumsum(1 + leaving)[leaving] - 1] = sides[leaving, 1]
+    return corners.reshape(-1, 2)

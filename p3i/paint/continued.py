@@ -45,7 +45,7 @@ class Bound:
     open: bool = False
 
     def holds(self, index: Index) -> Mask:
-        """Which (i, j) [M, 2] lie on the drawn side."""
+        """Which (i, j) [K, 2] lie on the drawn side."""
         form = self.form
         return form.i * index[:, 0] + form.j * index[:, 1] + form.constant >= -SLACK
 

@@ -70,7 +70,7 @@ def _plain(photo: Image, each: Object) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _straight(found: Objects, photo: Image, each: Object) -> tuple[np.ndarray, np.ndarray] | None:
-    turn, cell = _upright(found, each), np.array(each.cell)
+    turn, cell = _upright(each), np.array(each.cell)
     local = (cell - (each.x, each.y)) @ turn.T
     low, high = local.min(axis=0), local.max(axis=0)
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) @ turn + (each.x, each.y)
@@ -123,7 +123,7 @@ def _through_lens(
     return remapped(photo.pixels, photo.valid, np.where(shown.numpy()[..., None], bent.numpy(), -9.0))
 
 
-def _upright(found: Objects, each: Object) -> np.ndarray:
+def _upright(each: Object) -> np.ndarray:
     """The rotation [2, 2] of the plane that brings the object upright: rows are its right and its down."""
     outward = each.outward
     if outward is None:

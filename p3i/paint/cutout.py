@@ -61,7 +61,7 @@ class Levels:
         return cls(tuple(found))
 
     def read(self, at: NDArray, shrink: float) -> Floats:
-        """The colours [N, 3] at pixels [N, 2], read `shrink` pixels apart."""
+        """The colours [K, 3] at pixels [K, 2], read `shrink` pixels apart."""
         level = int(np.clip(np.round(np.log2(max(shrink, 1e-6)) + 0.2), 0, len(self.pictures) - 1))
         return taken(
             self.pictures[level], np.asarray(at, float) / 2**level, sharp=level == 0 and shrink < 0.8
@@ -99,7 +99,7 @@ class Cutout:
         return float(np.hypot(columns - half, rows - half).max(initial=0)) * self.step
 
     def at(self, local: Array, layer: Floats | None = None) -> Floats:
-        """`alpha`, or another `layer` of the grid, at places [N, 2] in units from the object's middle: [N].
+        """`alpha`, or another `layer` of the grid, at places [K, 2] in units from the object's middle: [K].
 
         Nothing lies beyond the grid.
         """
@@ -151,7 +151,7 @@ def _unevenness(mean: Floats, thing: Mask, own: Array) -> float:
 
 
 def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:
-    """How far inside its own cell each place [N] lies, in distances to the next object: [side, side].
+    """How far inside its own cell each place [K] lies, in distances to the next object: [side, side].
 
     The border is half way to the nearest other objects, drawn or not drawn, of an object in the middle.
     """
@@ -174,7 +174,7 @@ def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:
 
 
 def _cells(placed: Placed, photo: Image, local: Array) -> tuple[Floats, Mask]:
-    """The colours of all objects' cells [M, N, 3] and which places are known [M, N]."""
+    """The colours of all objects' cells [M, K, 3] and which places are known [M, K]."""
     maps = frames(placed)
     height, width = photo.valid.shape
     values = np.zeros((len(maps), len(local), 3), np.float32)

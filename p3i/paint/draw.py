@@ -14,11 +14,11 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
 from p3i.paint import outlines, scene
-from p3i.paint.lens import bent, bent_points, straight_photo
+from p3i.paint.lens import bent, bent_points
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
-from p3i.paint.placed import FocalSource, camera_of
+from p3i.paint.placed import FAR, FocalSource, camera_of, refuse_edge_on
 from p3i.paint.raster import paint
 from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.sprite import lay, sprite_of
@@ -40,9 +40,6 @@ Path_ = str | PathLike[str]
 
 _DOT_SHARE, _PHOTO_DOT_SHARE = 0.2, 0.11
 """A dot's radius as a share of the spacing; over a photo it should leave the object to be seen."""
-
-_FAR = 1e9
-"""Objects farther from the origin than this, in program units, are not drawn."""
 
 _SPRITE_SHARE = 0.9
 """A sprite's longer side as a share of the spacing."""
@@ -107,6 +104,7 @@ def render(
     image: Path_ | Image | None = None,
     sprite: Path_ | Image | None = None,
     beside: Path_ | None = None,
+    named_pictures: bool = True,
     **changes: Any,
 ) -> RenderedPicture:
     """Draw a program: dots coloured by loop index, cells, horizon, or a picture at each object.
@@ -114,10 +112,11 @@ def render(
     `program` may be a file, also a PNG or SVG that was drawn here before. With `image` the drawing goes over
     that photo; with `plane` the plane is seen straight on (and the photo straightened). `sprite` stands at
     every object, flat on the plane, and wins over the picture named in `Draw`, which is looked up beside the
-    program's file, or in the folder `beside`. `changes` are fields of RenderOptions.
+    program's file, or in the folder `beside`, unless `named_pictures` is False. `changes` are fields of
+    RenderOptions.
 
     Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
-    sketches among them, UsageError for options that cannot be.
+    sketches among them, ProgramError where the plane is seen edge-on, UsageError for options that cannot be.
     """
     options = changed(options or RenderOptions(), changes, verb="render")
     if not isinstance(program, Program):
@@ -126,8 +125,12 @@ def render(
     folder = Path(beside or ".")
     photo = read_image(image) if isinstance(image, str | PathLike) else image
     camera, focal_source = camera_of(program, photo, focal_mm=options.focal_mm)
+    if not options.plane or photo is not None:
+        refuse_edge_on(camera)
 
-    pictures = _sprite(program, sprite, folder)
+    pictures = None
+    if named_pictures or sprite is not None:
+        pictures = _sprite(program, sprite, folder, allow_outside=options.allow_outside)
     # Numbers of any size may stand in a program; what overflows around an object is left out.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         objects = _objects(program)
@@ -136,16 +139,15 @@ def render(
         if photo is not None and options.size is not None and not options.plane:
             photo = scaled(photo, options.size)
         k1 = program.header.lens_k1 if program.header else None
-        if k1 and photo is not None and options.plane:
-            photo = straight_photo(photo, k1)
-        layers = _layers(objects, view, options, photo=photo, pictures=pictures)
+        ground: tuple[scene.Layer, ...] = ()
+        if photo is not None:
+            ground = (scene.Pixels(photo_layer(photo, view, k1=k1)),)
+        layers = ground + _layers(objects, view, options, over_photo=photo is not None, pictures=pictures)
         centers_px, depth = view.project(objects.points)
         if k1 and not options.plane and _canvas(program, options, photo) is not None:
-            ground = layers[:1] if photo is not None else ()  # the photo is bent already
             layers = ground + tuple(bent(layer, view.size, k1) for layer in layers[len(ground) :])
             centers_px, _ = bent_points(centers_px, view.size, k1)
-    ground = layers[0] if photo is not None else None
-    transparent = isinstance(ground, scene.Pixels) and ground.values.shape[2] == 4
+    transparent = any(isinstance(layer, scene.Pixels) and layer.values.shape[2] == 4 for layer in ground)
     return RenderedPicture(
         scene.Scene(view.size, None if transparent else scene.WHITE, layers),
         program,
@@ -177,7 +179,7 @@ class _Objects:
 
 def _objects(program: Program) -> _Objects:
     found = points(program)
-    near = [place for place in found if abs(place[0]) < _FAR and abs(place[1]) < _FAR]
+    near = [place for place in found if abs(place[0]) < FAR and abs(place[1]) < FAR]
     # Coinciding draws are one object: painted twice, what is half transparent would not be.
     kept = [near[place] for place in distinct(near)]
     chart = outlines.chart_of(compile(program))
@@ -192,27 +194,23 @@ def _objects(program: Program) -> _Objects:
 
 
 def _layers(
-    objects: _Objects, view: View, options: RenderOptions, *, photo: Image | None, pictures: Image | None
+    objects: _Objects, view: View, options: RenderOptions, *, over_photo: bool, pictures: Image | None
 ) -> tuple[scene.Layer, ...]:
-    """All that is painted, from the ground up; the photo first, where there is one."""
+    """All that is painted on paper or over a photo, from the ground up."""
     spacing = outlines.pitch(objects.chart)
-    bare = photo is None and pictures is None
+    bare = not over_photo and pictures is None
     layers: list[scene.Layer] = []
-    if photo is not None:
-        layers.append(scene.Pixels(photo_layer(photo, view)))
     if options.cells if options.cells is not None else bare:
         layers += scene.grid(view, outlines.sides(objects.chart, objects.index), over_photo=not bare)
     if pictures is not None:
         units = options.sprite_units or _SPRITE_SHARE * spacing
         layers.append(scene.Pixels(lay(view, [sprite_of(pictures)], objects.points, units=units)))
     if options.horizon:
-        layers += scene.horizon(view, over_photo=photo is not None)
+        layers += scene.horizon(view, over_photo=over_photo)
     if options.markers if options.markers is not None else pictures is None:
         colours = scene.colours_of(objects.index, loops=objects.loops)
-        radius = (_DOT_SHARE if photo is None else _PHOTO_DOT_SHARE) * spacing
-        layers.append(
-            scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=photo is not None)
-        )
+        radius = (_PHOTO_DOT_SHARE if over_photo else _DOT_SHARE) * spacing
+        layers.append(scene.dots(view, objects.points, radius=radius, colours=colours, light_rim=over_photo))
     return tuple(layers)
 
 
@@ -244,8 +242,13 @@ def _view(
     return view
 
 
-def _sprite(program: Program, sprite: Path_ | Image | None, folder: Path) -> Image | None:
-    """The picture that stands at the objects: the one given, else the one that `Draw` names."""
+def _sprite(
+    program: Program, sprite: Path_ | Image | None, folder: Path, *, allow_outside: bool
+) -> Image | None:
+    """The picture that stands at the objects: the one given, else the one that `Draw` names.
+
+    A program may come from anybody: what it names is read from below its folder only, links followed.
+    """
     if isinstance(sprite, Image):
         return sprite
     if sprite is not None:
@@ -254,7 +257,17 @@ def _sprite(program: Program, sprite: Path_ | Image | None, folder: Path) -> Ima
     if named is None:
         return None
     try:
-        return read_image(folder / named)
+        place = (folder / named).resolve()
+        if not allow_outside and not place.is_relative_to(folder.resolve()):
+            raise FileError(
+                f"{named} lies outside the program's folder; --allow-outside reads it all the same "
+                "(allow_outside in Python)"
+            )
+        if place.exists() and not place.is_file():
+            raise FileError(f"{named} is no file with a picture")  # a pipe would be waited for, for ever
+        return read_image(place)
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a name that no system takes
+        raise FileError(f"the picture of Draw(...): {named} cannot be found: {error}") from None
     except FileError as error:
         raise FileError(f"the picture of Draw(...): {error}") from None
 
@@ -272,7 +285,7 @@ def _notes(
                 f"this photo of {photo.size.width} x {photo.size.height}"
             )
     if too_far:
-        notes.append(f"{too_far} objects lie more than {_FAR:g} units away and are not drawn")
+        notes.append(f"{too_far} objects lie more than {FAR:,.0f} units away and are not drawn")
     elif not len(depth):
         notes.append("the program draws nothing")
     if behind := int((depth <= 0).sum()):

@@ -17,18 +17,17 @@ from numpy.typing import NDArray
 
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
-from p3i.interp.lens import straight_from_photo
 from p3i.paint.cells import frames, pitch_px
 from p3i.paint.cleared import cleared, covered, local_points, object_masks, windows
 from p3i.paint.cutout import Cutout, Levels, cutout
 from p3i.paint.edit_options import EditOptions
+from p3i.paint.flat import flat_of
 from p3i.paint.outlines import chart_of, pitch
 from p3i.paint.picture import Picture, opacity, repainted
-from p3i.paint.placed import Placed, placed, straight
+from p3i.paint.placed import Placed, placed
 from p3i.records import changed
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
-from p3i.vision.warp import pixel_grid, remapped
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -89,21 +88,17 @@ def edit(
     ProgramError for a program without objects, UsageError where no object of `old` is on the photo.
     """
     asked: EditOptions = changed(options or EditOptions(), changes, verb="edit")
-    flat = straight(photo, old)
-    laid = placed(old, flat, focal_mm=asked.focal_mm)
+    flat = flat_of(photo, old, focal_mm=asked.focal_mm)
+    laid = flat.placed
     if not laid.in_sight().any():
         raise UsageError("no object of the old program lies on the photo: there is nothing to copy")
-    wanted = placed(_with_camera(new, old), flat, focal_mm=_focal(new, laid, asked))
-    found = _edited(flat, laid, wanted, asked)
-    k1 = old.header.lens_k1 if old.header else None
-    if not k1:
+    wanted = flat.laid(placed(_with_camera(new, old), photo, focal_mm=_focal(new, laid, asked)))
+    found = _edited(flat.photo, laid, wanted, asked)
+    if flat.k1 is None:
         return dataclasses.replace(found, photo=photo)
     # A bent photo is edited where it is straight, and what was touched is bent back.
-    at = straight_from_photo(pixel_grid(photo.size), k1, size=photo.size).numpy()
-    bent, _ = remapped(found.pixels, np.ones_like(found.touched), at)
-    marked = np.repeat(found.touched[:, :, None], 3, 2).astype(np.float32)
-    touched = remapped(marked, np.ones_like(found.touched), at)[0][:, :, 0] > 0
-    pixels = np.where(touched[:, :, None], bent, photo.pixels).astype(np.float32)
+    touched = flat.bent(np.repeat(found.touched[:, :, None], 3, 2).astype(np.float32))[:, :, 0] > 0
+    pixels = np.where(touched[:, :, None], flat.bent(found.pixels), photo.pixels).astype(np.float32)
     return dataclasses.replace(found, photo=photo, pixels=pixels, touched=touched)
 
 
@@ -139,7 +134,7 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
     notes += _doubts(cut)
     own = _mask(_only(laid, old_place), cut)
     removed = covered(_only(laid, gone), cut) & (own < 0.02) & photo.valid
-    ground = cleared(photo.pixels, photo.valid, laid, covered(laid, cut), cut)
+    ground = cleared(photo.pixels, photo.valid, laid, covered(laid, cut))
     pixels = np.where(removed[:, :, None], ground, photo.pixels)
     scale = options.scale
     if scale is None:

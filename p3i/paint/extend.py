@@ -27,9 +27,10 @@ from p3i.grammar.printer import format_program
 from p3i.paint.continued import Continued, continued, widened
 from p3i.paint.cutout import cutout
 from p3i.paint.extend_options import SIDES, ExtendOptions, Margins
+from p3i.paint.flat import Flat, flat_of
 from p3i.paint.outlines import chart_of, polygons
-from p3i.paint.picture import Picture, opacity, repainted
-from p3i.paint.placed import Placed, placed, straight
+from p3i.paint.picture import Picture, opacity, reframed, repainted
+from p3i.paint.placed import Placed, placed
 from p3i.paint.stack import fill_by_stack
 from p3i.records import changed
 from p3i.size import Size
@@ -57,6 +58,8 @@ _ROUNDS = 3
 class Extended:
     """A photo continued by `margins` (left, top, right, bottom) pixels: `pixels` float32 [H, W, 3].
 
+    `alpha` [H, W] is what was transparent in the photo, None where nothing was.
+
     `laid` is the program on the new canvas with the objects that were added, the last `added` of them;
     `smooth` is the share of the new pixels that no object's cell covers, or for which no cell was like
     enough: there the border is continued. `program` draws the same on the new canvas, None where none does.
@@ -64,6 +67,7 @@ class Extended:
 
     photo: Image
     pixels: Floats
+    alpha: Floats | None
     margins: Sides
     laid: Placed
     added: int
@@ -77,12 +81,15 @@ class Extended:
         return self.laid.size
 
     def paint(self) -> Picture:
-        """The picture in the photo's depth; what was transparent in the photo still is."""
-        alpha = opacity(self.photo)
-        wide = None if alpha is None else np.ones(self.pixels.shape[:2], np.float32)
-        if wide is not None:
-            wide[_window(self.margins, self.photo.size)] = alpha
-        return repainted(self.photo, self.pixels, alpha=wide)
+        """The picture in the photo's depth; what was transparent in the photo still is.
+
+        Its EXIF has the focal of the wider view, where it is known and the axis meets the middle.
+        """
+        left, top, right, bottom = self.margins
+        focal_mm = self.photo.focal_mm if left == right and top == bottom else None
+        if focal_mm is not None:
+            focal_mm *= self.photo.size.longer / self.size.longer
+        return reframed(repainted(self.photo, self.pixels, alpha=self.alpha), focal_mm=focal_mm)
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""
@@ -119,13 +126,11 @@ def extend(
     program without objects.
     """
     asked: ExtendOptions = changed(options or ExtendOptions(), changes, verb="extend")
-    lacking, notes = np.zeros_like(photo.valid), list[str]()
-    if program.header and program.header.lens_k1:
-        flat = straight(photo, program)
-        lacking = ~straight(dataclasses.replace(photo, valid=np.ones_like(photo.valid)), program).valid
-        photo = dataclasses.replace(flat, valid=flat.valid | lacking)
+    notes = list[str]()
+    flat = flat_of(photo, program, focal_mm=asked.focal_mm)
+    if flat.k1 is not None:
         notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
-    laid = placed(program, photo, focal_mm=asked.focal_mm)
+    laid = dataclasses.replace(placed(program, photo, focal_mm=asked.focal_mm), lens_k1=None)
     sides = margins_px(laid, asked.by)
     left, top, right, bottom = sides
     size = Size(photo.size.width + left + right, photo.size.height + top + bottom)
@@ -137,13 +142,10 @@ def extend(
     more = continued(laid, (-left - 0.5, -top - 0.5, size.width - left - 0.5, size.height - top - 0.5))
     wide = _wider(laid, more, sides, size)
 
-    pixels = np.zeros((size.height, size.width, 3), np.float32)
-    known = np.zeros((size.height, size.width), bool)
-    inside = _window(sides, photo.size)
-    pixels[inside], known[inside] = photo.pixels, photo.valid & ~lacking
-    hole = np.ones_like(known)
-    hole[inside] = lacking
-    pattern = hole & _ground(wide, len(laid.index), more)
+    pixels, known, shown = _laid_out(flat, sides, size)
+    alpha = _alpha(photo, known, shown, sides) if flat.k1 is None else _alpha(None, known, shown, sides)
+    hole = ~shown
+    pattern = hole & _ground(wide)
     bare = hole & ~pattern
     left_over = pattern
     for _ in range(_ROUNDS):
@@ -158,16 +160,15 @@ def extend(
     bare |= left_over
     if bare.any():
         fill_in(pixels, (known | hole) & ~bare, bare)
-    pixels[inside] = np.where(lacking[:, :, None], pixels[inside], photo.pixels)
-    smooth = float(bare.sum() / hole.sum())
+    smooth = float(bare.sum() / max(1, hole.sum()))
     wider = _program(program, wide, more, sides, laid.size)
     notes += _notes(smooth, more, wider, sides)
-    if len(more.index) and cutout(laid, photo).unlike > _MOST_UNLIKE:
+    if len(more.index) and cutout(flat.placed, flat.photo).unlike > _MOST_UNLIKE:
         notes.append(
             "look at what was added: the photo's objects differ much from one another, and mixtures of them "
             "look like ghosts"
         )
-    return Extended(photo, pixels, sides, wide, len(more.index), smooth, wider, tuple(notes))
+    return Extended(photo, pixels, alpha, sides, wide, len(more.index), smooth, wider, tuple(notes))
 
 
 def margins_px(laid: Placed, by: Margins) -> Sides:
@@ -247,7 +248,7 @@ def _wider(laid: Placed, more: Continued, sides: Sides, size: Size) -> Placed:
     )
 
 
-def _ground(wide: Placed, own: int, more: Continued) -> Mask:
+def _ground(wide: Placed) -> Mask:
     """The pixels of the new picture that lie in a cell: bool [H, W]."""
     cells, front = project(wide.image_from_plane, polygons(chart_of(wide.pattern), wide.index))
     ground = np.zeros((wide.size.height, wide.size.width), np.uint8)
@@ -256,6 +257,44 @@ def _ground(wide: Placed, own: int, more: Continued) -> Mask:
         if ahead and np.abs(cell).max() < limit:
             cv2.fillPoly(ground, [np.rint(cell * 16).astype(np.int32)], 1, shift=4)
     return ground > 0
+
+
+def _laid_out(flat: Flat, sides: Sides, size: Size) -> tuple[Floats, Mask, Mask]:
+    """The photo on the new canvas: pixels [H, W, 3], which of them are known, and which it shows at all.
+
+    What a bent photo shows beyond its old frame counts where it is known.
+    """
+    pixels = np.zeros((size.height, size.width, 3), np.float32)
+    known, shown = np.zeros((2, size.height, size.width), bool)
+    left, top = sides[0] - flat.corner[0], sides[1] - flat.corner[1]
+    into, out_of = [], []
+    for start, length, limit in (
+        (top, flat.photo.size.height, size.height),
+        (left, flat.photo.size.width, size.width),
+    ):
+        into.append(slice(max(0, start), min(limit, start + length)))
+        out_of.append(slice(max(0, -start), min(length, limit - start)))
+    to, of = tuple(into), tuple(out_of)
+    pixels[to] = flat.photo.pixels[of]
+    known[to] = flat.photo.valid[of]
+    shown[to] = flat.seen[of] & flat.photo.valid[of]
+    inside = _window(sides, flat.size)
+    corner = (
+        slice(flat.corner[1], flat.corner[1] + flat.size.height),
+        slice(flat.corner[0], flat.corner[0] + flat.size.width),
+    )
+    shown[inside] = flat.seen[corner]
+    return pixels, known & shown, shown
+
+
+def _alpha(photo: Image | None, known: Mask, shown: Mask, sides: Sides) -> Floats | None:
+    """How opaque the new picture is: as the photo in its place; where there is none, as it is known."""
+    own = None if photo is None else opacity(photo)
+    if photo is None or own is None:
+        return None if (known | ~shown).all() else (known | ~shown).astype(np.float32)
+    wide = np.ones(known.shape, np.float32)
+    wide[_window(sides, photo.size)] = own
+    return wide
 
 
 def _window(sides: Sides, size: Size) -> tuple[slice, slice]:

@@ -14,6 +14,7 @@ import torch
 from p3i.errors import ProgramError
 from p3i.interp.lens import straight_from_photo
 from p3i.paint import outlines
+from p3i.paint.clip import cut_polygon
 from p3i.paint.placed import Placed
 from p3i.paint.rectify_options import RectifyOptions
 from p3i.paint.straightened import Straightened, upright_from_plane
@@ -67,6 +68,10 @@ def straightened(
         scale = fit * 0.999
         notes.append(f"scaled by {scale:.3g} to make no more than {options.max_px:,} pixels (--max-px)")
     result = _canvas(placed, linear, rectangle, scale=scale, finest=finest, k1=k1, options=options)
+    while options.scale is None and (pixels := result.size.width * result.size.height) > options.max_px:
+        # Sides are whole numbers of pixels, at least one: rounding took it over the limit.
+        scale *= min(0.999, math.sqrt(options.max_px / pixels))
+        result = _canvas(placed, linear, rectangle, scale=scale, finest=finest, k1=k1, options=options)
     refuse_huge(result.size, max_px=options.max_px)
     return result, tuple(notes)
 
@@ -111,7 +116,7 @@ def _project(placed: Placed, point: np.ndarray) -> np.ndarray:
 
 
 def _unproject(placed: Placed, pixels: np.ndarray) -> np.ndarray:
-    """Pinhole pixels [M, 2] to plane points [M, 2]."""
+    """Pinhole pixels [K, 2] to plane points [K, 2]."""
     mapped = np.c_[pixels, np.ones(len(pixels))] @ np.linalg.inv(placed.image_from_plane).T
     return mapped[:, :2] / mapped[:, 2:]
 
@@ -128,7 +133,7 @@ def _finest(placed: Placed, linear: np.ndarray, point: np.ndarray) -> float:
 def _ground(
     placed: Placed, linear: np.ndarray, middle: np.ndarray, *, farthest: float, k1: float | None
 ) -> tuple[np.ndarray, bool]:
-    """The outline [M, 2], in upright units, of what the photo shows up to `farthest`; whether that cut it."""
+    """The outline [K, 2], in upright units, of what the photo shows up to `farthest`; whether that cut it."""
     size = placed.size
     along = np.linspace(0, 1, 33)[:-1]
     corners = np.array([(0, 0), (size.width, 0), (size.width, size.height), (0, size.height)]) - 0.5
@@ -140,14 +145,7 @@ def _ground(
     nearness_row = np.linalg.inv(placed.image_from_plane)[2]
     depth = float(placed.image_from_plane[2] @ np.array([*middle, 1.0]))
     inside = np.c_[border, np.ones(len(border))] @ nearness_row * depth - 1 / farthest
-    kept: list[np.ndarray] = []
-    for k in range(len(border)):
-        here, there = inside[k - 1], inside[k]
-        if (here >= 0) != (there >= 0):
-            kept.append(border[k - 1] + here / (here - there) * (border[k] - border[k - 1]))
-        if there >= 0:
-            kept.append(border[k])
-    return _unproject(placed, np.array(kept)) @ linear.T, bool((inside < 0).any())
+    return _unproject(placed, cut_polygon(border, inside)) @ linear.T, bool((inside < 0).any())
 
 
 def _pattern(placed: Placed, linear: np.ndarray, middle: np.ndarray, *, k1: float | None) -> Rectangle:

@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
-from p3i.interp.lens import straight_from_photo
+from p3i.paint.filled import Filled, share_text
+from p3i.paint.flat import flat_of
 from p3i.paint.inpaint_options import InpaintOptions
 from p3i.paint.objects import objects_of
 from p3i.paint.picture import Picture, opacity, repainted
-from p3i.paint.placed import Placed, placed, straight
+from p3i.paint.placed import Placed, placed
 from p3i.paint.points_options import PointsOptions
 from p3i.paint.stack import fill_by_stack
 from p3i.records import changed
 from p3i.vision.image import Image, read_mask
-from p3i.vision.warp import pixel_grid, remapped
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -38,16 +38,18 @@ _LENS_MARGIN_PX = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inpainted:
-    """A photo with its `hole` [H, W] filled: `pixels` float32 [H, W, 3]; `notes` are sentences for the user.
+    """A photo with its `hole` [H, W] filled by `method`: `pixels` float32 [H, W, 3].
 
-    `unlike` is the share of the hole for which the program knows nothing like it: there the surroundings were
-    continued.
+    `unlike` is the share of the hole for which the program knows nothing like it; `fallback` the share that
+    something simpler than the method filled, that one included. `notes` are sentences for the user.
     """
 
     photo: Image
     pixels: Floats
     hole: Mask
+    method: str
     unlike: float
+    fallback: float
     notes: tuple[str, ...] = ()
 
     def paint(self) -> Picture:
@@ -59,6 +61,17 @@ class Inpainted:
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""
         self.paint().save(path, kind=kind, force=force)
+
+    def record(self) -> dict[str, Any]:
+        """The facts as plain JSON values, the same for all methods; docs/inpaint.md says what each means."""
+        return {
+            "photo": [self.photo.size.width, self.photo.size.height],
+            "method": self.method,
+            "filled": int(self.hole.sum()),
+            "unlike": round(self.unlike, 4),
+            "fallback": round(self.fallback, 4),
+            "notes": list(self.notes),
+        }
 
 
 def inpaint(
@@ -82,19 +95,15 @@ def inpaint(
     """
     asked: InpaintOptions = changed(options or InpaintOptions(), changes, verb="inpaint")
     hole = hole_from(photo, program, mask=mask, remove=remove, focal_mm=asked.focal_mm)
-    k1 = program.header.lens_k1 if program.header else None
-    if not k1:
-        return _filled(photo, placed(program, photo, focal_mm=asked.focal_mm), hole, asked, progress)
-    # A bent photo is filled where it is straight, and the hole's pixels are brought back.
-    flat = straight(photo, program)
+    flat = flat_of(photo, program, focal_mm=asked.focal_mm)
+    if flat.k1 is None:
+        return _filled(photo, flat.placed, hole, asked, progress)
+    # A bent photo is filled where it is straight, and the hole's pixels are brought back. Around the hole as
+    # much is filled as bringing back mixes in, beyond the photo's edge too.
     wider = np.ones((2 * _LENS_MARGIN_PX + 1,) * 2, np.uint8)
-    marked = dataclasses.replace(photo, pixels=np.repeat(hole[:, :, None], 3, 2).astype(np.float32))
-    flat_hole = cv2.dilate((straight(marked, program).pixels[:, :, 0] > 0).astype(np.uint8), wider) > 0
-    laid = placed(program, flat, focal_mm=asked.focal_mm)
-    found = _filled(flat, laid, flat_hole & flat.valid, asked, progress)
-    at = straight_from_photo(pixel_grid(photo.size), k1, size=photo.size).numpy()
-    bent, _ = remapped(found.pixels, np.ones_like(hole), at)
-    pixels = np.where(hole[:, :, None], bent, photo.pixels)
+    flat_hole = cv2.dilate(flat.marked(hole).astype(np.uint8), wider) > 0
+    found = _filled(flat.photo, flat.placed, flat_hole, asked, progress)
+    pixels = np.where(hole[:, :, None], flat.bent(found.pixels), photo.pixels)
     return dataclasses.replace(found, photo=photo, pixels=pixels, hole=hole)
 
 
@@ -160,39 +169,43 @@ def _filled(
 ) -> Inpainted:
     """The hole of a straight photo filled by the method asked for."""
     notes: list[str] = []
-    if not (laid.in_sight()).any():
-        notes.append("no object of the program lies on the photo: the surroundings are continued")
-    unlike = 0.0
+    if not laid.in_sight().any():
+        notes.append("no object of the program lies on the photo: it shows nothing to fill the hole from")
     match options.method:
         case "npn":
-            from p3i.paint.npn.options import NetworkOptions
-            from p3i.paint.npn.paint import paint
-
-            network = NetworkOptions(
-                steps=options.steps,
-                time_s=options.time_s,
-                checkpoint=options.checkpoint,
-                seed=options.seed,
-                device=options.device,
-                threads=options.threads,
-            )
-
-            def told(step: int, steps: int, _misfit: float) -> None:
-                if progress is not None:
-                    progress("training", step / steps)
-
-            pixels = paint(photo, laid, hole, network, progress=told)
+            found = _by_network(photo, laid, hole, options, progress)
         case "patchmatch":
             from p3i.paint.patchmatch import fill_by_patchmatch
 
-            pixels = fill_by_patchmatch(photo.pixels, photo.valid, hole, laid, seed=options.seed)
-            if laid.basis is None:
-                notes.append("patchmatch is guided by lattices only: here it fills unguided")
+            found = fill_by_patchmatch(photo.pixels, photo.valid, hole, laid, seed=options.seed)
         case _:
             pixels, bare = fill_by_stack(photo.pixels, photo.valid, hole, laid, progress=progress)
-            unlike = float(bare.sum() / hole.sum())
-    if unlike >= 0.01:
-        notes.append(
-            f"for {unlike:.0%} of the hole the program has nothing like it: the surroundings are continued"
-        )
-    return Inpainted(photo, pixels, hole, unlike, tuple(notes))
+            part = share_text(bare, hole)
+            said = [f"for {part} the program has nothing like it: the surroundings are continued"] * bool(
+                part
+            )
+            found = Filled(pixels, bare, bare, tuple(said))
+    unlike, fallback = (float(part.sum() / hole.sum()) for part in (found.unlike, found.fallback))
+    return Inpainted(photo, found.pixels, hole, options.method, unlike, fallback, (*notes, *found.notes))
+
+
+def _by_network(
+    photo: Image, laid: Placed, hole: Mask, options: InpaintOptions, progress: Progress | None
+) -> Filled:
+    from p3i.paint.npn.options import NetworkOptions
+    from p3i.paint.npn.paint import paint
+
+    network = NetworkOptions(
+        steps=options.steps,
+        time_s=options.time_s,
+        checkpoint=options.checkpoint,
+        seed=options.seed,
+        device=options.device,
+        threads=options.threads,
+    )
+
+    def told(step: int, steps: int, _misfit: float) -> None:
+        if progress is not None:
+            progress("training", step / steps)
+
+    return paint(photo, laid, hole, network, progress=told)

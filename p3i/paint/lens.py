@@ -12,7 +12,6 @@ import torch
 from p3i.interp.lens import photo_from_straight, straight_from_photo
 from p3i.paint.scene import Dots, Labels, Layer, Pixels, Strokes
 from p3i.size import Size
-from p3i.vision.image import Image
 from p3i.vision.warp import pixel_grid, remapped
 
 _PART_PX = 12.0
@@ -57,14 +56,6 @@ def bent_points(points_px: np.ndarray, size: Size, k1: float) -> tuple[np.ndarra
     photo, shown = photo_from_straight(straight, k1, size=size)
     seen = shown.numpy() & known
     return np.where(seen[..., None], photo.numpy(), np.nan), seen
-
-
-def straight_photo(photo: Image, k1: float) -> Image:
-    """The photo as a pinhole camera would show it on the same canvas; what is not in it is unknown."""
-    points, shown = photo_from_straight(pixel_grid(photo.size), k1, size=photo.size)
-    pixels, valid = remapped(photo.pixels, photo.valid, points.numpy())
-    source = dataclasses.replace(photo.source, alpha=None)
-    return dataclasses.replace(photo, pixels=pixels, valid=valid & shown.numpy(), source=source)
 
 
 def _bent_segments(segments: np.ndarray, size: Size, k1: float) -> np.ndarray:

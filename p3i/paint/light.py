@@ -1,7 +1,7 @@
 """The light over a pattern: one smooth gain that makes its cells alike.
 
-Convention: `samples` [K, N, 3] are the same N places of K patches, in 0..1, `seen` [K, N] which are known,
-`points` [K, N, 2] where they lie on the plane. The gain is the exponential of a polynomial in the plane's
+Convention: `samples` [L, K, 3] are the same K places of L patches, in 0..1, `seen` [L, K] which are known,
+`points` [L, K, 2] where they lie on the plane. The gain is the exponential of a polynomial in the plane's
 coordinates, one a channel; dividing by it gives the pattern in even light. Cells that were painted darker on
 one side stay so: only what changes from cell to cell is light.
 """
@@ -32,7 +32,7 @@ class Light:
         return np.exp(np.clip(log_gain, -_MOST_LOG_GAIN, _MOST_LOG_GAIN))
 
 
-def even(points: np.ndarray) -> Light:
+def even() -> Light:
     """No light to remove."""
     return Light(np.zeros((0, 3)), np.zeros(2), 1.0)
 
@@ -45,7 +45,7 @@ def fitted_light(samples: np.ndarray, seen: np.ndarray, points: np.ndarray) -> L
     count = len(samples)
     terms = 5 if count >= 8 else 2 if count >= 3 else 0
     if not terms:
-        return even(points)
+        return even()
     middle = points[seen].mean(axis=0)
     radius = max(1e-9, float(np.abs(points[seen] - middle).max()))
     logs = np.log(samples + _DARK)

@@ -3,7 +3,7 @@
 Convention: K places around a hole with colours [K, 3] (RGB in 0..1) and weights [K] by nearness; S sources.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -19,6 +19,10 @@ _PRIOR = 0.1
 _PRIOR_VARIANCE = 1e-3
 # Residuals of this size count half as much as small ones in finding a shift.
 _ROBUST = 0.02
+# A source is shifted so many times.
+_SHIFTS = 3
+# The most that is carried in from a rim.
+_MOST_CARRIED = 0.15
 # How far weights are drawn to the sources' own misfits: a share of the mean square of the residuals.
 _RIDGE = 0.3
 # What is carried in from a rim is smoothed along it over this share of the distance to the next object, times
@@ -66,6 +70,55 @@ def trusted(residuals: NDArray, weights: NDArray, misfits: Array, *, least: floa
     towards, even = np.linalg.solve(normal, np.stack([ridge * prior, np.ones(len(misfits))], 1)).T
     found = np.clip(towards + even * (1 - towards.sum()) / even.sum(), least, None)
     return found / found.sum()
+
+
+def aligned(
+    read: Callable[[Array], NDArray],
+    slopes: Callable[[Array], Sequence[NDArray]],
+    wanted: NDArray,
+    weights: NDArray,
+    *,
+    most_px: float,
+) -> tuple[Array, Array, Array, float]:
+    """The shift [2] under which a source is likest to what is wanted, its gain and offset [3], its misfit.
+
+    `read` gives the source's colours [K, 3] under a shift of up to `most_px` along each axis, `slopes` how
+    they change along x and y. The misfit is the weighted mean difference that is left of `wanted` [K, 3].
+    """
+    best: tuple[Array, Array, Array, float] | None = None
+    shift = np.zeros(2)
+    for left in range(_SHIFTS, -1, -1):
+        colours = read(shift)
+        gain, offset = matched_light(colours, wanted, weights)
+        residual = wanted - (gain * colours + offset)
+        misfit = weighted_misfit(residual, weights)
+        if best is None or misfit < best[3]:
+            best = shift, gain, offset, misfit
+        if left:
+            step = shift_step([gain * slope for slope in slopes(shift)], residual, weights)
+            shift = np.clip(shift + step, -most_px, most_px)
+    assert best is not None
+    return best
+
+
+def weighted_misfit(residual: NDArray, weights: NDArray) -> float:
+    """The mean of |residual| [K, 3] by weights [K]."""
+    return float((weights[:, None] * np.abs(residual)).sum() / max(float(weights.sum()), 1e-9) / 3)
+
+
+def rim_of(hole: NDArray, known: NDArray, *, reach_px: float) -> NDArray[np.bool_]:
+    """The known pixels [h, w] beside a hole [h, w], up to `reach_px` away from it."""
+    far = np.asarray(cv2.distanceTransform((hole == 0).astype(np.uint8), cv2.DIST_L2, 5))
+    return (far > 0) & (far <= reach_px) & known
+
+
+def membrane(off: NDArray, rim: NDArray[np.bool_], *, spacing_px: float) -> Floats:
+    """What a hole's rim [h, w] lacks, `off` [h, w, 3] there, carried smoothly inwards: [h, w, 3].
+
+    0 without a rim; nothing is lifted or lowered by more than `_MOST_CARRIED`.
+    """
+    limited = np.clip(off, -_MOST_CARRIED, _MOST_CARRIED).astype(np.float32)
+    return carried(limited * rim[:, :, None], rim.astype(np.float32), spacing_px=spacing_px)
 
 
 def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:

@@ -16,9 +16,10 @@ from p3i.grammar.ast import Program
 from p3i.interp.camera import Camera
 from p3i.paint import outlines
 from p3i.paint.clip import clipped_to_canvas, cut_before_camera, without_straight_corners
+from p3i.paint.flat import Flat, flat_of
 from p3i.paint.lens import bent_points
 from p3i.paint.naming import Arrangement, Naming, named
-from p3i.paint.placed import Placed, placed, straight
+from p3i.paint.placed import Placed, placed
 from p3i.paint.points_options import PointsOptions, format_of
 from p3i.paint.presence import presence_of
 from p3i.records import changed
@@ -64,8 +65,8 @@ class Objects:
     """The listed objects, row by row; `size` is the photo's, `image` its name, None where there is none.
 
     `outside` and `faint` count the objects that were left out: beyond the photo, and less present than asked;
-    `behind` those that lie behind the camera, which have no place on the photo. `notes` are sentences for the
-    user.
+    `behind` those that lie behind the camera, which have no place on the photo, `placed.far`
+    those too far away. `notes` are sentences for the user.
     """
 
     objects: tuple[Object, ...]
@@ -108,7 +109,7 @@ class Objects:
             text += f": {self.there - unsure} there, {shown - self.there} not"
             text += f", {unsure} not to be judged" if unsure else ""
         left = [(self.outside, "outside the photo"), (self.faint, "less present than asked")]
-        left.append((self.behind, "behind the camera"))
+        left += [(self.behind, "behind the camera"), (self.placed.far, "too far away")]
         dropped = [f"{count} {where}" for count, where in left if count]
         return text + (f" (left out: {', '.join(dropped)})" if dropped else "")
 
@@ -163,21 +164,14 @@ def objects_of(
     canvas = photo if photo is not None else _blank(program, options)
     laid = placed(program, canvas, focal_mm=options.focal_mm)
     naming = named(laid)
-    straight_px, front = laid.centers_px()
-    k1 = program.header.lens_k1 if program.header else None
-    centers_px = straight_px
-    if k1:
-        centers_px, shown = bent_points(np.where(front[:, None], straight_px, np.nan), laid.size, k1)
-        front = front & shown
-    limits = np.array([laid.size.width, laid.size.height]) - 0.5
-    with np.errstate(invalid="ignore"):
-        inside = front & (centers_px >= -0.5).all(axis=1) & (centers_px <= limits).all(axis=1)
+    centers_px, front = laid.shown_px()
+    inside = laid.in_sight()
     kept = np.flatnonzero(front if options.outside else inside)
     kept = kept[np.lexsort((naming.columns[kept], naming.rows[kept]))]
 
     presence: list[float | None] = [None] * len(kept)
     if photo is not None:
-        presence = _presence(laid, straight(photo, program), kept, inside[kept])
+        presence = _presence(flat_of(photo, program, focal_mm=laid.camera.focal_mm), kept, inside[kept])
     faint = [score is not None and score < options.min_presence for score in presence]
     chart = outlines.chart_of(laid.pattern)
     cells = outlines.polygons(chart, laid.index[kept])
@@ -186,7 +180,7 @@ def objects_of(
         if left_out:
             continue
         cell = without_straight_corners(cell)
-        cell_px = cell_on_photo(laid, cell, k1)
+        cell_px = cell_on_photo(laid, cell)
         if options.clip:
             cell_px = clipped_to_canvas(cell_px, laid.size)
         found.append(
@@ -222,19 +216,19 @@ def objects_of(
     )
 
 
-def cell_on_photo(laid: Placed, cell: np.ndarray, k1: float | None) -> np.ndarray:
+def cell_on_photo(laid: Placed, cell: np.ndarray) -> np.ndarray:
     """The outline [K, 2] of a cell of the plane on the photo, without what lies behind the camera."""
     cell = cut_before_camera(cell, laid.image_from_plane)
     if len(cell) < 3:
         return np.zeros((0, 2))
     at = np.c_[cell, np.ones(len(cell))] @ laid.image_from_plane.T
     pixels = at[:, :2] / at[:, 2:]
-    if not k1:
+    if laid.lens_k1 is None:
         return pixels
     # A straight side is seen bent: in eight parts it is, to a fraction of a pixel.
     parts = np.linspace(0, 1, 9)[:-1, None]
     fine = (pixels[:, None] + parts * (np.roll(pixels, -1, axis=0) - pixels)[:, None]).reshape(-1, 2)
-    bent, shown = bent_points(fine, laid.size, k1)
+    bent, shown = bent_points(fine, laid.size, laid.lens_k1)
     return bent[shown]
 
 
@@ -255,9 +249,9 @@ def _blank(program: Program, options: PointsOptions) -> Image:
     return Image(pixels, np.broadcast_to(np.True_, pixels.shape[:2]))
 
 
-def _presence(laid: Placed, photo: Image, kept: np.ndarray, inside: np.ndarray) -> list[float | None]:
+def _presence(flat: Flat, kept: np.ndarray, inside: np.ndarray) -> list[float | None]:
     scores = np.full(len(kept), np.nan)
-    scores[inside] = presence_of(laid, photo, laid.index[kept[inside]])
+    scores[inside] = presence_of(flat.placed, flat.photo, flat.placed.index[kept[inside]])
     return [round(score, 3) if np.isfinite(score) else None for score in scores.tolist()]
 
 

@@ -42,6 +42,10 @@ class RenderOptions:
         "The longer side of an object's picture in program units; by default a little less than the spacing.",
         Spelt(metavar="U"),
     ] = None
+    allow_outside: Annotated[
+        bool,
+        "Read a picture named in Draw(...) from anywhere; by default only from below the program's folder.",
+    ] = False
     focal_mm: PhotoFocal = None
     max_px: Annotated[
         int, "Refuse to make pictures of more than N pixels (width times height).", Spelt(metavar="N")

@@ -15,12 +15,10 @@ import torch
 from p3i.grammar.ast import Polar
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
+from p3i.paint.placed import FAR
 
 DEFAULT_PITCH = 10.0
 """The spacing, in program units, that is assumed for an object that stands alone."""
-
-_FAR = 1e10
-"""Points farther out than this, in program units, are left out: they come of overflows."""
 
 _BEND_DEG = 4.0
 """The angle that a straight part of a bent side covers."""
@@ -38,7 +36,7 @@ class Chart:
     axes: tuple[int, int]
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """The points [M, 2] at `place` [M, 4]."""
+        """The points [K, 2] at `place` [K, 4]."""
         middle, sideways = _points(self.pattern, place[:, :2]), place[:, 2:]
         match self.axes:
             case (0, 1):
@@ -101,7 +99,7 @@ def surroundings(chart: Chart, index: np.ndarray) -> np.ndarray:
     middle, apart = _points(chart.pattern, index), pitch(chart)
     found += [middle + apart * turn for turn in around[::2]]
     points = np.concatenate(found)
-    return points[(np.abs(points) < _FAR).all(axis=1)]
+    return points[(np.abs(points) < FAR).all(axis=1)]
 
 
 def sides(chart: Chart, index: np.ndarray) -> np.ndarray:
@@ -127,7 +125,7 @@ def sides(chart: Chart, index: np.ndarray) -> np.ndarray:
         line = np.stack(lines, axis=1)
         segments.append(np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 2))
     found = np.concatenate(segments)
-    return found[(np.abs(found) < _FAR).all(axis=(1, 2))]
+    return found[(np.abs(found) < FAR).all(axis=(1, 2))]
 
 
 def polygons(chart: Chart, index: np.ndarray) -> np.ndarray:
@@ -181,7 +179,7 @@ def _orientations(pattern: Pattern, index: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _step(pattern: Pattern, index: np.ndarray, variable: int) -> np.ndarray:
-    """How far the point moves from half a step before to half a step after: [M, 2]."""
+    """How far the point moves from half a step before to half a step after: [K, 2]."""
     half = np.zeros(2)
     half[variable] = 0.5
     return _points(pattern, index + half) - _points(pattern, index - half)

@@ -95,7 +95,7 @@ def in_photo(
 
 
 def finest(placed: Placed, points: np.ndarray) -> float:
-    """Photo pixels in a program unit at the plane points [M, 2], where and in the direction they are most."""
+    """Photo pixels in a program unit at the plane points [K, 2], where and in the direction they are most."""
     h = placed.image_from_plane
     mapped = points @ h[:, :2].T + h[:, 2]
     at = mapped[:, :2] / mapped[:, 2:]
@@ -142,6 +142,8 @@ def _rings(placed: Placed, seen: np.ndarray) -> Patches:
     if _along(x, turn) or _along(y, turn):
         raise ProgramError("a tile needs a ring of one radius; this program is a spiral")
     step_deg = getattr(x.angle, "ij"[turn])
+    if abs(step_deg) > 360:
+        raise ProgramError(f"a tile needs a ring; a step of {step_deg:g} degrees goes round more than once")
     radius = np.array([_at(x.radius, placed.index), _at(y.radius, placed.index)]).T
     sizes = np.round(np.abs(radius).mean(axis=1), 6)
     # Rings of several radii: the one that most objects on the photo belong to, the larger of two.

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.errors import UsageError
+from p3i.paint.filled import Filled, share_text
 from p3i.paint.placed import Placed
+from p3i.paint.stack import unlike
 from p3i.vision.sheet import project
 from p3i.vision.warp import pixel_grid
 
@@ -17,8 +19,10 @@ Mask = NDArray[np.bool_]
 _RADIUS = 7  # of the patches that are compared, in pixels: the best on photos of lattices
 
 
-def fill_by_patchmatch(pixels: Floats, known: Mask, hole: Mask, placed: Placed, *, seed: int = 0) -> Floats:
+def fill_by_patchmatch(pixels: Floats, known: Mask, hole: Mask, placed: Placed, *, seed: int = 0) -> Filled:
     """The photo [H, W, 3] with its hole filled, in steps of 1/255; what is not `known` is no source.
+
+    Where nothing like the hole is to be seen elsewhere, and on rings, the program guides nothing.
 
     Raises UsageError where the library is not installed or does not load.
     """
@@ -43,7 +47,13 @@ def fill_by_patchmatch(pixels: Floats, known: Mask, hole: Mask, placed: Placed, 
         found = patch_match.inpaint_regularity(values, mask, guide, **options)
     result = pixels.copy()
     result[hole] = found[hole].astype(np.float32) / 255
-    return result
+    apart = unlike(pixels, known, hole, placed)
+    notes: list[str] = []
+    if guide is None:
+        notes.append("patchmatch is guided by lattices only: here it fills unguided")
+    if of_hole := share_text(apart, hole):
+        notes.append(f"for {of_hole} the program has nothing like it: patchmatch takes what looks alike")
+    return Filled(result, apart, hole if guide is None else apart, tuple(notes))
 
 
 def _phases(placed: Placed) -> Floats | None:

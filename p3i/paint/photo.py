@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from p3i.errors import UsageError
+from p3i.paint.flat import laid_flat
 from p3i.paint.sprite import in_front, plain, premultiplied
 from p3i.paint.view import View
 from p3i.size import Size
@@ -31,20 +32,33 @@ def scaled(photo: Image, size: Size) -> Image:
     return Image(colours, values[:, :, 3] >= 0.5, photo.focal_mm, source, photo.notes)
 
 
-def photo_layer(photo: Image, view: View) -> np.ndarray:
-    """The photo on the canvas, straightened where the view is: uint8 [H, W, 3], or 4 if parts are missing."""
+def photo_layer(photo: Image, view: View, *, k1: float | None) -> np.ndarray:
+    """The photo on the canvas, straightened where the view is: uint8 [H, W, 3], or 4 if parts are missing.
+
+    A straight view undoes the lens too.
+    """
     if not view.plane:
         values = plain(_rgba(photo))
         return np.ascontiguousarray(values[:, :, :3]) if (values[:, :, 3] == 255).all() else values
     plane_from_canvas = np.linalg.inv(view.canvas_from_plane)
+    photo_from_plane = view.camera.image_from_plane(photo.size).numpy()
+    if k1:
+        photo, _, (left, top) = laid_flat(photo, k1)
+        photo_from_plane = np.array([[1.0, 0, left], [0, 1, top], [0, 0, 1]]) @ photo_from_plane
     # Reduce the photo first where the straight view is smaller, or fine texture would flicker.
-    photo_from_canvas = view.camera.image_from_plane(photo.size).numpy() @ plane_from_canvas
+    photo_from_canvas = photo_from_plane @ plane_from_canvas
     middle = photo_from_canvas @ np.array([*view.size.middle, 1])
     density = np.linalg.det(photo_from_canvas) / max(float(middle[2]), 1e-6) ** 3
     shrink = float(np.sqrt(max(density, 1e-12)))
     if shrink > 1.3:
-        photo = resized(photo, max(1, round(photo.size.longer / shrink)))
-    photo_from_canvas = view.camera.image_from_plane(photo.size).numpy() @ plane_from_canvas
+        small = resized(photo, max(1, round(photo.size.longer / shrink)))
+        scale = small.size.longer / photo.size.longer
+        shift = (scale - 1) / 2
+        photo, photo_from_plane = (
+            small,
+            np.array([[scale, 0, shift], [0, scale, shift], [0, 0, 1]]) @ photo_from_plane,
+        )
+    photo_from_canvas = photo_from_plane @ plane_from_canvas
     padded = np.pad(_rgba(photo), ((1, 1), (1, 1), (0, 0)))  # transparent all around
     padded_from_photo = np.array([[1.0, 0, 1], [0, 1, 1], [0, 0, 1]])
     values = warp_pixels(padded, padded_from_photo @ photo_from_canvas, view.size)

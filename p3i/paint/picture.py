@@ -1,5 +1,6 @@
 """A finished picture with all that its file holds: depth, transparency, colour profile, EXIF, resolution."""
 
+import dataclasses
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from p3i.errors import UsageError
 from p3i.paint.rectify_options import PICTURE_KINDS
 from p3i.size import Size
+from p3i.vision.exif import reframed_exif
 from p3i.vision.image import Image
 from p3i.vision.tiff import has_tifffile
 from p3i.vision.write import encode, write_bytes
@@ -113,6 +115,16 @@ def repainted(photo: Image, pixels: np.ndarray, *, alpha: np.ndarray | None) -> 
         photo.source.icc,
         photo.source.exif,
     )
+
+
+def reframed(picture: Picture, *, focal_mm: float | None) -> Picture:
+    """A picture of another view of its photo: the EXIF speaks of this one, whose focal is `focal_mm`.
+
+    None is a view that no camera has, or that of a camera whose focal nobody knows.
+    """
+    if picture.exif is None:
+        return picture
+    return dataclasses.replace(picture, exif=reframed_exif(picture.exif, picture.size, focal_mm=focal_mm))
 
 
 def _on_white(values: np.ndarray, alpha: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 Convention: arrays of float64; points of the plane in program units, points of the photo in pixels, pixel
 centres at whole numbers; matrices map program units to pixels, their third row is the depth (positive in
-front). A photo whose lens bends lines (header key lens_k1) is straightened first: see `straight`.
+front). On a photo whose lens bends lines (header key lens_k1) they lead to pinhole pixels: see flat.py.
 """
 
 from dataclasses import dataclass
@@ -17,15 +17,18 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import distinct, nest, points
-from p3i.paint.lens import straight_photo
+from p3i.paint.lens import bent_points
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
 
 FocalSource = Literal["option", "header", "exif", "default"]
 
-# Objects farther out, in program units, come of overflows.
-_FAR = 1e6
+FAR = 1e6
+"""Objects farther from the origin than this, in program units, are left out: ten thousand pictures away."""
+
+# A plane whose normal leaves less than this of itself along the optical axis is seen edge-on: 0.0006 degrees.
+_EDGE_ON = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +36,8 @@ class Placed:
     """A program on a canvas of `size`, seen by `camera`.
 
     `index` [M, 2] int64 and `points` [M, 2] are its objects in program order (coinciding draws are one);
-    `image_from_plane` is [3, 3]. Objects at or behind the camera are among them: `centers_px` tells.
+    `image_from_plane` is [3, 3]. Objects at or behind the camera are among them: `centers_px` tells; `far`
+    counts the draws that were left out, beyond FAR. `lens_k1` bends the canvas; None where it is straight.
     """
 
     pattern: Pattern
@@ -42,16 +46,27 @@ class Placed:
     image_from_plane: np.ndarray
     index: np.ndarray
     points: np.ndarray
+    far: int = 0
+    lens_k1: float | None = None
 
     def centers_px(self) -> tuple[np.ndarray, np.ndarray]:
-        """The objects on the photo: pixels [M, 2], and which lie in front of the camera [M]."""
+        """The objects in pinhole pixels [M, 2], and which lie in front of the camera [M]."""
         return project(self.image_from_plane, self.points)
+
+    def shown_px(self) -> tuple[np.ndarray, np.ndarray]:
+        """The objects where the lens shows them: pixels [M, 2], and which it shows [M]."""
+        pixels, front = self.centers_px()
+        if self.lens_k1 is None:
+            return pixels, front
+        pixels, shown = bent_points(np.where(front[:, None], pixels, np.nan), self.size, self.lens_k1)
+        return pixels, front & shown
 
     def in_sight(self) -> np.ndarray:
         """Which objects [M] lie on the photo."""
-        pixels, front = self.centers_px()
+        pixels, front = self.shown_px()
         limits = np.array([self.size.width, self.size.height]) - 0.5
-        return front & (pixels >= -0.5).all(1) & (pixels <= limits).all(1)
+        with np.errstate(invalid="ignore"):
+            return front & (pixels >= -0.5).all(1) & (pixels <= limits).all(1)
 
     def at(self, index: np.ndarray) -> np.ndarray:
         """The plane points [K, 2] of any (i, j) [K, 2], drawn or not, fractions too."""
@@ -92,25 +107,49 @@ def camera_of(
 def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> Placed:
     """`program` on the canvas of `photo`; the focal is `focal_mm`, else the header's, the photo's, 35 mm.
 
-    Raises ProgramError for a program without objects, or with none in front of the camera.
+    Raises ProgramError for a program without objects, with none in front of the camera, whose plane is seen
+    edge-on, or whose loops step farther than any picture reaches.
     """
     camera, _ = camera_of(program, photo, focal_mm=focal_mm)
-    found = [place for place in points(program) if abs(place[0]) < _FAR and abs(place[1]) < _FAR]
+    refuse_edge_on(camera)
+    drawn = points(program)
+    found = [place for place in drawn if abs(place[0]) < FAR and abs(place[1]) < FAR]
     kept = [found[place] for place in distinct(found)]
+    pattern = compile(program)
     result = Placed(
-        compile(program),
+        pattern,
         camera,
         photo.size,
         camera.image_from_plane(photo.size).numpy(),
         np.array([place[2:] for place in kept], np.int64).reshape(-1, 2),
         np.array([place[:2] for place in kept], float).reshape(-1, 2),
+        len(drawn) - len(found),
+        (program.header.lens_k1 if program.header else None) or None,
     )
     if not len(kept) or not result.centers_px()[1].any():
         raise ProgramError("the program draws nothing in front of its camera: `p3i check` says where it does")
+    _refuse_overflow(result)
     return result
 
 
-def straight(photo: Image, program: Program) -> Image:
-    """The photo as a pinhole camera would show it: itself, unless the program's header names a lens_k1."""
-    k1 = program.header.lens_k1 if program.header else None
-    return straight_photo(photo, k1) if k1 else photo
+def refuse_edge_on(camera: Camera) -> None:
+    """Raise ProgramError where a camera sees its plane edge-on: as a line, on which no two points differ."""
+    if abs(camera.normal[2]) < _EDGE_ON:
+        raise ProgramError(
+            f"the plane is seen edge-on (rx={camera.rx_deg:g}, ry={camera.ry_deg:g}), as a line on which "
+            "nothing can be told apart: tilt it by less than 90 degrees"
+        )
+
+
+def _refuse_overflow(laid: Placed) -> None:
+    """ProgramError where a cell would reach farther than any picture: numbers overflow on the way there."""
+    loops = nest(laid.pattern.program)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for axis, loop in enumerate((loops.for_i, loops.for_j)):
+            half = 0.5 * (np.arange(2) == axis) * (loop is not None)
+            steps = np.abs(laid.at(laid.index + half) - laid.at(laid.index - half))
+            if not (steps < FAR).all():  # nan is none either
+                raise ProgramError(
+                    f"one step of the loop over {'ij'[axis]} goes farther than {FAR:,.0f} units, "
+                    "ten thousand pictures: write smaller numbers in Draw"
+                )

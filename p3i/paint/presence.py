@@ -43,7 +43,7 @@ _DIVIDE, _SLOPE = 0.5, 10.0
 def presence_of(placed: Placed, photo: Image, index: np.ndarray) -> Array:
     """How surely the photo shows each object of `index` [K, 2]: [K] in 0..1, nan where it cannot be judged.
 
-    `photo` is straight (placed.straight) and has the size of `placed`.
+    `photo` is flat, as `placed` is (flat.py).
     """
     unknown = np.full(len(index), np.nan)
     chart = chart_of(placed.pattern)

@@ -9,7 +9,7 @@ import numpy as np
 from p3i.grammar.ast import Program
 from p3i.paint.back import back, likeness
 from p3i.paint.framing import straightened
-from p3i.paint.picture import Picture, depth, opacity
+from p3i.paint.picture import Picture, depth, opacity, reframed
 from p3i.paint.placed import placed
 from p3i.paint.rectify_options import RectifyOptions
 from p3i.paint.straightened import Straightened
@@ -44,12 +44,15 @@ class Rectified:
         return self.view.size
 
     def paint(self) -> Picture:
-        """The straightened picture, as deep as the photo; transparent where the photo shows nothing."""
+        """The straightened picture, as deep as the photo; transparent where the photo shows nothing.
+
+        Its EXIF names no focal: seen straight on, a plane looks alike through every lens.
+        """
         source = self.photo.source
         values, alpha = resample(
             self.photo.pixels, opacity(self.photo), self.view.in_photo, size=self.size, bits=depth(self.photo)
         )
-        return Picture(values, alpha, source.icc, source.exif, self.view.dpi)
+        return reframed(Picture(values, alpha, source.icc, source.exif, self.view.dpi), focal_mm=None)
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Paint and write the view: `Picture.save`."""

@@ -21,9 +21,6 @@ PICTURE_KINDS = ("png", "jpg", "tiff", "webp")
 _TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
 
 
-"""A record of options."""
-
-
 @dataclass(frozen=True, slots=True)
 class CellSize:
     """The true width and height of one cell, in millimetres."""

@@ -59,7 +59,7 @@ def show(
         horizon=options.horizon,
         focal_mm=options.focal_mm,
     )
-    picture = render(program, below, image=photo)
+    picture = render(program, below, image=photo, named_pictures=False)
     view = camera_view(picture.camera, picture.size)
     layers = _layers(found, view, options)
     k1 = program.header.lens_k1 if program.header else None

@@ -4,9 +4,10 @@ A source is the ground of another object, brought over by the program's own move
 source and photo show the same, so there the source is shifted by the little that the program is off (Lucas
 and Kanade, IJCAI 1981), its light is matched, and its misfit tells how far to believe it inside.
 
-Convention: points are pixels of the photo [N, 2]; colours RGB in 0..1.
+Convention: points are pixels of the photo [L, 2]; colours RGB in 0..1.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.cells import moves, nearest, pitch_px
-from p3i.paint.matching import matched_light, shift_step
+from p3i.paint.matching import aligned
 from p3i.paint.placed import Placed
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
@@ -43,14 +44,13 @@ _LEAST_ON_GROUND = 0.6
 _PROBES = 400
 # Shifts reach this far, in distances to the next object.
 _MOST_SHIFT = 0.12
-_SHIFTS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hole:
     """One piece of what is to be filled, seen from the object `target` in its middle.
 
-    `points` [N, 2] are its pixels; `around` [K, 2] pixels beside it, with `weights` [K] by nearness and the
+    `points` [L, 2] are its pixels; `around` [K, 2] pixels beside it, with `weights` [K] by nearness and the
     `colours` [K, 3] that the photo has there. `spacing_px` is how far the next object lies.
     """
 
@@ -76,7 +76,7 @@ class Source:
     misfit: float
 
     def where(self, points: Array) -> tuple[Array, Mask]:
-        """The points [N, 2] like these, and which lie in front of the camera."""
+        """The points [L, 2] like these, and which lie in front of the camera."""
         at, front = project(self.from_hole, points)
         return at + self.shift_px, front
 
@@ -95,7 +95,7 @@ class Ground:
         return cls(pixels, cv2.erode(padded, np.ones((3, 3), np.uint8))[1:-1, 1:-1].astype(np.float32))
 
     def known(self, points: Array) -> Mask:
-        """Which of the points [N, 2] can be read."""
+        """Which of the points [L, 2] can be read."""
         height, width = self.sure.shape
         x, y = points[:, 0], points[:, 1]
         inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
@@ -103,7 +103,7 @@ class Ground:
 
 
 def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed) -> Hole:
-    """A piece of the hole, its pixels [N, 2], with its surroundings: what is `known` [H, W] of `shown`."""
+    """A piece of the hole, its pixels [L, 2], with its surroundings: what is `known` [H, W] of `shown`."""
     pixels, front = placed.centers_px()
     away = np.hypot(*(pixels - points.mean(0)).T)
     target = int(np.argmin(np.where(front, away, np.inf)))
@@ -132,6 +132,24 @@ def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIE
     """
     if not len(hole.around):
         return []
+    found = [_aligned(hole, ground, matrix) for matrix in _laid_on(hole, ground, placed, most=most)]
+    alike = sorted((one for one in found if one is not None), key=lambda source: source.misfit)
+    return [one for one in alike if one.misfit <= _WORSE * alike[0].misfit + _WORSE_ANYWAY][:_MOST_KEPT]
+
+
+def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> Mask:
+    """Which of a hole's pixels [L] the photo knows on the ground of one of the `most` nearest objects."""
+    shown = np.zeros(len(hole.points), bool)
+    for matrix in _laid_on(hole, ground, placed, most=most):
+        at, front = project(matrix, hole.points)
+        shown |= front & ground.known(at)
+        if shown.all():
+            break
+    return shown
+
+
+def _laid_on(hole: Hole, ground: Ground, placed: Placed, *, most: int) -> Iterator[Array]:
+    """The photo's matrices [3, 3] that take the hole to its like on other drawn ground, the nearest first."""
     pixels, _ = placed.centers_px()
     away = np.hypot(*(pixels - pixels[hole.target]).T)
     plane_moves = moves(placed, hole.target)
@@ -145,18 +163,13 @@ def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIE
     probes, _ = project(plane_from_image, probes)
     spacing = _spacing(placed, hole.target)
     drawn = _apart(placed, probes) <= _GROUND * spacing
-    found: list[Source] = []
     for number in tried:
         moved, _ = project(plane_moves[number], probes)
         scale = np.sqrt(abs(np.linalg.det(plane_moves[number][:2, :2])))
         on_ground = _apart(placed, moved) <= _GROUND * spacing * scale
         if (on_ground | ~drawn).mean() < _LEAST_ON_GROUND:
             continue
-        source = _aligned(hole, ground, placed.image_from_plane @ plane_moves[number] @ plane_from_image)
-        if source is not None:
-            found.append(source)
-    found.sort(key=lambda source: source.misfit)
-    return [one for one in found if one.misfit <= _WORSE * found[0].misfit + _WORSE_ANYWAY][:_MOST_KEPT]
+        yield placed.image_from_plane @ plane_moves[number] @ plane_from_image
 
 
 def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
@@ -168,24 +181,15 @@ def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
     weights = hole.weights * (front & ground.known(at))
     if (weights > 0).mean() < _LEAST_AROUND:
         return None
-    best: Source | None = None
-    shift, most = np.zeros(2), _MOST_SHIFT * hole.spacing_px
-    for left in range(_SHIFTS, -1, -1):
-        colours = taken(ground.pixels, at + shift)
-        gain, offset = matched_light(colours, hole.colours, weights)
-        residual = hole.colours - (gain * colours + offset)
-        misfit = float((weights[:, None] * np.abs(residual)).sum() / weights.sum() / 3)
-        if best is None or misfit < best.misfit:
-            best = Source(from_hole, shift.copy(), gain, offset, misfit)
-        if not left:
-            break
-        slopes = [
-            gain * (taken(ground.pixels, at + shift + half) - taken(ground.pixels, at + shift - half))
-            for half in np.array([(0.5, 0.0), (0.0, 0.5)])
-        ]
-        step = shift_step(slopes, residual, weights)
-        shift = np.clip(shift + step, -most, most)
-    return best
+
+    def read(shift: Array) -> Floats:
+        return taken(ground.pixels, at + shift)
+
+    def slopes(shift: Array) -> list[Floats]:
+        return [read(shift + half) - read(shift - half) for half in np.array([(0.5, 0.0), (0.0, 0.5)])]
+
+    most_px = _MOST_SHIFT * hole.spacing_px
+    return Source(from_hole, *aligned(read, slopes, hole.colours, weights, most_px=most_px))
 
 
 def _spacing(placed: Placed, target: int) -> float:

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.cells import nearest
-from p3i.paint.matching import carried, trusted
+from p3i.paint.matching import membrane, rim_of, trusted
 from p3i.paint.placed import Placed
-from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, sources
+from p3i.paint.sources import MOST_TRIED, Ground, Hole, Source, hole_of, shown_elsewhere, sources
 from p3i.vision.fill import fill_in
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
@@ -28,9 +28,8 @@ Progress = Callable[[str, float], None]
 
 # A piece of a hole with more cells than this is filled in blocks of two by two.
 _MOST_CELLS = 9
-# The rim at which the fill is compared with the photo, in pixels, and the most that is carried in from there.
+# The rim at which the fill is compared with the photo, in pixels.
 _RIM_PX = 4.0
-_MOST_CARRIED = 0.15
 
 
 def fill_by_stack(
@@ -70,8 +69,19 @@ def fill_by_stack(
     return result, bare
 
 
+def unlike(pixels: Floats, known: Mask, hole: Mask, placed: Placed) -> Mask:
+    """Where a hole [H, W] is like nothing that the program shows elsewhere on the photo: [H, W]."""
+    known = known & ~hole
+    ground = Ground.of(pixels, known)
+    found = np.zeros_like(hole)
+    for points in _pieces(hole, known, placed):
+        columns, rows = points.astype(int).T
+        found[rows, columns] = ~shown_elsewhere(hole_of(points, pixels, known, placed), ground, placed)
+    return found
+
+
 def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
-    """The hole piece by piece, pixels [N, 2] each: what hangs together, in blocks where it is large.
+    """The hole piece by piece, pixels [L, 2] each: what hangs together, in blocks where it is large.
 
     The blocks of a large piece come from its rim inwards, so that each has something beside it.
     """
@@ -105,7 +115,7 @@ def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
 def _filled(
     hole: Hole, ground: Ground, found: list[Source], shown: Floats, before: Mask
 ) -> tuple[Floats, Mask]:
-    """The colours of a hole's pixels [N, 3], and which of them any source shows [N]."""
+    """The colours of a hole's pixels [L, 3], and which of them any source shows [L]."""
     if not found:
         return np.zeros((len(hole.points), 3), np.float32), np.zeros(len(hole.points), bool)
     weights = _weights(hole, ground, found)
@@ -127,7 +137,7 @@ def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
 def _mixed(
     points: Array, ground: Ground, found: list[Source], weights: Array, *, sharp: bool
 ) -> tuple[Floats, Array]:
-    """The sources' colours at the hole's points, mixed [N, 3], and the weight of those that show them [N]."""
+    """The sources' colours at the hole's points, mixed [L, 3], and the weight of those that show them [L]."""
     total, weight = np.zeros((len(points), 3)), np.zeros(len(points))
     for source, share in zip(found, weights, strict=True):
         if share < 1e-4:
@@ -142,7 +152,7 @@ def _mixed(
 def _carried(
     hole: Hole, ground: Ground, found: list[Source], weights: Array, shown: Floats, before: Mask
 ) -> Floats:
-    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [N, 3].
+    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [L, 3].
 
     The rim is of the photo, and of what was filled `before` [H, W]; both are in `shown` [H, W, 3].
     """
@@ -152,22 +162,23 @@ def _carried(
     inside = np.zeros((height, width), np.uint8)
     columns, rows = (hole.points.astype(int) - low).T
     inside[rows, columns] = 1
-    distance = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
     known = np.zeros((height, width), bool)
     window = (slice(low[1], low[1] + height), slice(low[0], low[0] + width))
     part = (ground.sure[window] > 0) | before[window]
     known[: part.shape[0], : part.shape[1]] = part
-    rim_rows, rim_columns = np.nonzero((distance > 0) & (distance <= _RIM_PX) & known)
+    rim_rows, rim_columns = np.nonzero(rim_of(inside, known, reach_px=_RIM_PX))
     if not len(rim_rows):
         return np.zeros((len(hole.points), 3), np.float32)
-    rim = np.stack([rim_columns + low[0], rim_rows + low[1]], 1).astype(float)
-    colours, weight = _mixed(rim, ground, found, weights, sharp=False)
+    colours, weight = _mixed(
+        np.stack([rim_columns + low[0], rim_rows + low[1]], 1).astype(float),
+        ground,
+        found,
+        weights,
+        sharp=False,
+    )
     compared = weight > 0.3
-    if not compared.any():
-        return np.zeros((len(hole.points), 3), np.float32)
     rim_rows, rim_columns = rim_rows[compared], rim_columns[compared]
-    photo = shown[rim_rows + low[1], rim_columns + low[0]]
-    off = np.clip(photo - colours[compared], -_MOST_CARRIED, _MOST_CARRIED)
-    values, weighed = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
-    values[rim_rows, rim_columns], weighed[rim_rows, rim_columns] = off, 1
-    return carried(values, weighed, spacing_px=hole.spacing_px)[rows, columns]
+    off, rim = np.zeros((height, width, 3), np.float32), np.zeros((height, width), bool)
+    off[rim_rows, rim_columns] = shown[rim_rows + low[1], rim_columns + low[0]] - colours[compared]
+    rim[rim_rows, rim_columns] = True
+    return membrane(off, rim, spacing_px=hole.spacing_px)[rows, columns]

@@ -106,7 +106,7 @@ def tile(photo: Image, program: Program, options: TileOptions | None = None, **c
     refuse_huge(whole, max_px=options.max_px)
     larger = _larger(size, down=patches.cell is not None)
     stack = _stack(photo, patches, size, larger, k1=k1)
-    light = even(np.zeros(2))
+    light = even()
     if options.light:
         light = _light(stack)
         stack = _lit(stack, light)

@@ -11,6 +11,7 @@ import numpy as np
 
 from p3i.errors import UsageError
 from p3i.interp.camera import Camera
+from p3i.paint.clip import cut
 from p3i.size import Size
 
 AUTO_PX = 1024
@@ -61,7 +62,7 @@ class View:
     def project_segments(self, segments: np.ndarray) -> np.ndarray:
         """Segments of the plane [S, 2, 2] in pixels, cut off before the camera and around the canvas."""
         depth = segments @ self.canvas_from_plane[2, :2] + self.canvas_from_plane[2, 2]
-        segments = _cut(segments, depth - _NEAR * self.depth_unit)
+        segments, _ = cut(segments, depth - _NEAR * self.depth_unit)
         pixels, _ = self.project(segments)
         return clip_to_canvas(pixels, self.size)
 
@@ -105,24 +106,13 @@ def clip_to_canvas(segments: np.ndarray, size: Size) -> np.ndarray:
     """The parts of the segments [S, 2, 2] (pixels) that lie on the canvas or just beside it."""
     margin = 8 + size.longer / 100
     for axis, last in ((0, size.width - 1), (1, size.height - 1)):
-        segments = _cut(segments, segments[..., axis] + margin)
-        segments = _cut(segments, last + margin - segments[..., axis])
+        segments, _ = cut(segments, segments[..., axis] + margin)
+        segments, _ = cut(segments, last + margin - segments[..., axis])
     return segments
 
 
-def _cut(segments: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """The parts of the segments [S, 2, 2] where a linear function, `inside` [S, 2] at their ends, is >= 0."""
-    kept = (inside >= 0).any(axis=1) & np.isfinite(inside).all(axis=1)
-    segments, inside = segments[kept], inside[kept]
-    first, second = inside[:, :1], inside[:, 1:]
-    gap = np.where(first == second, 1, first - second)
-    crossing = segments[:, 0] + (first / gap) * (segments[:, 1] - segments[:, 0])
-    ends = [np.where(inside[:, end : end + 1] >= 0, segments[:, end], crossing) for end in (0, 1)]
-    return np.stack(ends, axis=1)
-
-
 def _window(points: np.ndarray, size: Size | None, longer: int) -> tuple[Size, np.ndarray]:
-    """A canvas that shows all `points` [M, 2], and the similarity to its pixels [3, 3]."""
+    """A canvas that shows all `points` [K, 2], and the similarity to its pixels [3, 3]."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = np.maximum(high - low, 1e-3 * max(1e-6, float((high - low).max())))
     if size is None:

@@ -97,7 +97,7 @@ def encode(
         return encode_tiff_16(array, icc=icc, exif=exif, dpi=dpi)
     picture = Pil.fromarray(array)
     options: dict[str, object] = {"quality": _JPEG_QUALITY} if name in ("JPEG", "WEBP") else {}
-    if name == "TIFF":
+    if name == "TIFF" and not exif:  # libtiff, which compresses, writes no EXIF block and raises
         options["compression"] = "tiff_deflate"
     if icc and name != "BMP":
         options["icc_profile"] = icc

@@ -1,5 +1,6 @@
 """The shell of `p3i inpaint`: masks and removed objects, what is written and where, and what is refused."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,14 @@ def test_a_mask_is_filled_and_all_else_kept(folder: Path, capsys: pytest.Capture
     assert np.array_equal(before[~marked], after[~marked])
     assert not np.array_equal(before[marked], after[marked])
     assert "750 pixels filled" in capsys.readouterr().err
+
+
+def test_the_facts_go_to_a_file_and_the_picture_elsewhere(folder: Path) -> None:
+    words = ["inpaint", "photo.png", "grid.p3p", "--mask", "mask.png", "-q"]
+    assert run([*words, "-o", "out.png", "--json", "facts.json"]) == 0
+    facts = json.loads((folder / "facts.json").read_text())
+    assert (facts["method"], facts["filled"], facts["unlike"]) == ("stack", 750, 0)
+    assert (folder / "out.png").exists()
 
 
 def test_several_objects_are_removed_at_once(folder: Path) -> None:

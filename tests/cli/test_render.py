@@ -129,6 +129,19 @@ def test_errors_come_as_json_where_asked(folder: Path, capsys: pytest.CaptureFix
     assert said["code"] == 3 and "missing.p3p" in said["error"]
 
 
+def test_a_picture_beside_the_programs_folder_needs_a_word_of_leave(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "red.png"
+    write_image(elsewhere, np.full((8, 8, 3), (200, 0, 0), np.uint8))
+    (folder / "named.p3p").write_text(f'Draw("{elsewhere}", x=0, y=0)')
+    words = ["render", "named.p3p", "--size", "40x40", "-o", "named.png"]
+    assert run(words) == 3
+    assert "--allow-outside reads it" in capsys.readouterr().err
+    assert run([*words, "--allow-outside"]) == 0
+    assert (read_image(folder / "named.png").pixels[20, 20] * 255).round().tolist() == [200, 0, 0]
+
+
 def test_notes_are_said_unless_quiet(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "none.p3p").write_text("for i in range(0, 0):\n    Draw(x=9*i, y=0)\n")
     assert run(["render", "none.p3p", "-o", "a.png"]) == 0

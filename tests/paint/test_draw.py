@@ -1,6 +1,7 @@
 """Whole pictures: what stands where, in which colour, on which canvas, and what is refused."""
 
 import dataclasses
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from strategies import programs
 
+from p3i import loads
 from p3i.errors import FileError, P3IError, ProgramError, UsageError
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Polar, Program
 from p3i.grammar.printer import format_program
@@ -22,7 +24,7 @@ from p3i.size import Size
 from p3i.vision.image import Image, read_image
 from p3i.vision.write import write_image
 
-sentence, default = told(RenderOptions)
+sentence, _ = told(RenderOptions)
 
 torch.set_num_threads(1)
 
@@ -222,6 +224,54 @@ def test_the_picture_named_by_draw_is_looked_up_beside_the_program(tmp_path: Pat
     assert at(render(program, sprite=green, size=Size(100, 100)).pixels(), np.array([50, 50])) == [0, 255, 0]
 
 
+def named_pictures(tmp_path: Path) -> Path:
+    """A program's folder, below it and beside it a red picture, and links in it that lead out and in."""
+    red = np.full((8, 8, 3), (200, 0, 0), np.uint8)
+    folder = tmp_path / "programs"
+    (folder / "below").mkdir(parents=True)
+    write_image(tmp_path / "red.png", red)
+    write_image(folder / "below" / "red.png", red)
+    (folder / "out.png").symlink_to(tmp_path / "red.png")
+    (folder / "in.png").symlink_to(folder / "below" / "red.png")
+    return folder
+
+
+@pytest.mark.parametrize("name", ["{beside}", "../red.png", "below/../../red.png", "out.png", "../gone.png"])
+def test_pictures_outside_the_programs_folder_are_read_only_where_that_is_allowed(
+    name: str, tmp_path: Path
+) -> None:
+    folder = named_pictures(tmp_path)
+    name = name.format(beside=tmp_path / "red.png")
+    program = folder / "row.p3p"
+    program.write_text(f'Draw("{name}", x=0, y=0)')
+    with pytest.raises(FileError, match=r"picture of Draw.* outside the program's folder; --allow-outside"):
+        render(program)
+    with pytest.raises(FileError, match="outside"):
+        render(loads(program.read_text()), beside=folder)
+    if "gone" not in name:
+        picture = render(program, size=Size(100, 100), allow_outside=True)
+        assert at(picture.pixels(), np.array([50, 50])) == [200, 0, 0]
+
+
+@pytest.mark.parametrize("name", ["below/red.png", "in.png", "below/../in.png", "{inside}"])
+def test_pictures_below_the_programs_folder_are_read(name: str, tmp_path: Path) -> None:
+    folder = named_pictures(tmp_path)
+    program = folder / "row.p3p"
+    program.write_text(f'Draw("{name.format(inside=folder / "below" / "red.png")}", x=0, y=0)')
+    assert at(render(program, size=Size(100, 100)).pixels(), np.array([50, 50])) == [200, 0, 0]
+
+
+@pytest.mark.parametrize("name", ["pipe", "below", "loop", "/dev/zero"])
+def test_what_is_no_picture_file_is_refused_and_not_waited_for(name: str, tmp_path: Path) -> None:
+    folder = named_pictures(tmp_path)
+    os.mkfifo(folder / "pipe")
+    (folder / "loop").symlink_to(folder / "loop")
+    program = folder / "row.p3p"
+    program.write_text(f'Draw("{name}", x=0, y=0)')
+    with pytest.raises(FileError, match=r"the picture of Draw\(\.\.\.\)"):
+        render(program, allow_outside=True)
+
+
 @pytest.mark.parametrize("size", [Size(100_000, 100_000), Size(1, 200_000_000)])
 def test_a_picture_beyond_the_limit_is_refused_with_the_way_to_raise_it(size: Size) -> None:
     with pytest.raises(UsageError, match=f"100,000,000 pixels; --max-px {size.width * size.height}"):
@@ -288,7 +338,6 @@ def test_options_are_checked_and_documented() -> None:
             RenderOptions(**wrong)
     for field in dataclasses.fields(RenderOptions):
         assert sentence(field.name).endswith(".")
-        assert default(field.name) == getattr(RenderOptions(), field.name)
 
 
 def test_a_guarded_outline_draws_only_its_cells() -> None:

@@ -155,14 +155,6 @@ def test_a_note_says_where_an_edit_is_not_to_be_relied_on(
     assert says is None or says in doubts[0]
 
 
-def test_a_bent_photo_is_edited_where_it_is_straight() -> None:
-    header = "# /// p3p\n# version = 1\n# lens_k1 = -0.05\n# ///\n"
-    photo = drawn(LATTICE)
-    found = edit(photo, loads(header + LATTICE), loads(SPARSER))
-    assert found.removed == 28
-    assert np.array_equal(found.pixels[~found.touched], photo.pixels[~found.touched])
-
-
 def test_only_what_the_objects_cover_is_cleared() -> None:
     photo = drawn(LATTICE)
     laid = placed(loads(LATTICE), photo)

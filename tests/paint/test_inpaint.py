@@ -82,15 +82,48 @@ def test_objects_are_removed_by_index_and_by_name() -> None:
     assert np.array_equal(inpaint(photo, program, remove=["d5"]).hole, by_index)
 
 
-def test_a_hole_like_nothing_else_is_continued_and_said() -> None:
+@pytest.mark.parametrize(
+    ("method", "instead"),
+    [
+        ("stack", "surroundings are continued"),
+        ("npn", "surroundings are continued"),
+        ("patchmatch", "patchmatch takes what looks alike"),
+    ],
+)
+def test_a_hole_like_nothing_else_is_said_to_be_so_by_every_method(method: str, instead: str) -> None:
     photo = drawn(LATTICE)
     hole = np.zeros(photo.valid.shape, bool)
     hole[:30, :30] = True
     alone = loads(LATTICE.replace("range(-4, 5)", "range(0, 1)").replace("range(-3, 4)", "range(0, 1)"))
-    found = inpaint(photo, alone, mask=hole)
-    assert found.unlike == 1
-    assert any("continued" in note for note in found.notes)
+    found = inpaint(photo, alone, mask=hole, method=method)
+    assert found.unlike == found.fallback == 1
+    assert [note for note in found.notes if "100% of the hole the program has nothing like it" in note]
+    assert any(instead in note for note in found.notes)
     assert np.isfinite(found.pixels).all()
+
+
+@pytest.mark.parametrize("method", ["stack", "npn", "patchmatch"])
+def test_every_method_tells_the_same_facts(method: str) -> None:
+    photo = drawn(LATTICE, width=200, height=160)
+    hole = np.zeros(photo.valid.shape, bool)
+    hole[70:85, 90:105] = True
+    soon = {"time_s": 0.1} if method == "npn" else {}
+    found = inpaint(photo, loads(LATTICE), mask=hole, method=method, **soon)
+    record = found.record()
+    assert set(record) == {"photo", "method", "filled", "unlike", "fallback", "notes"}
+    assert (record["method"], record["filled"], record["unlike"]) == (method, found.hole.sum(), 0)
+    assert record["notes"] == list(found.notes)
+
+
+def test_npn_says_where_a_hole_of_many_cells_leaves_it_nothing_to_learn_from() -> None:
+    photo = drawn(LATTICE, width=240, height=200)
+    hole = np.zeros(photo.valid.shape, bool)
+    hole[10:190, 10:165] = True
+    found = inpaint(photo, loads(LATTICE), mask=hole, method="npn", steps=1)
+    plain = inpaint(photo, loads(LATTICE), mask=hole)
+    assert np.array_equal(found.pixels, plain.pixels)
+    assert found.fallback == 1 > found.unlike
+    assert any("too few other cells" in note and "the stack's fill stands" in note for note in found.notes)
 
 
 def test_light_is_matched_at_the_hole() -> None:
@@ -124,15 +157,6 @@ def test_a_mask_of_another_size_is_refused(tmp_path: Path) -> None:
 def test_an_object_that_is_not_there_is_refused_with_those_that_are() -> None:
     with pytest.raises(UsageError, match=r"there is no object Z9 .*A1, A2, A3"):
         inpaint(drawn(LATTICE), loads(LATTICE), remove=["Z9"])
-
-
-def test_a_bent_photo_is_filled_where_it_is_straight() -> None:
-    header = "# /// p3p\n# version = 1\n# lens_k1 = -0.05\n# ///\n"
-    photo = drawn(LATTICE)
-    hole = cell_hole(photo, LATTICE, 31)
-    found = inpaint(photo, loads(header + LATTICE), mask=hole)
-    assert np.array_equal(found.pixels[~hole], photo.pixels[~hole])
-    assert np.abs(found.pixels - photo.pixels)[hole].mean() * 255 < 25
 
 
 def test_moves_lay_each_object_on_each_other() -> None:
@@ -175,6 +199,7 @@ def test_patchmatch_on_a_ring_says_that_nothing_guides_it() -> None:
     photo = drawn(RING)
     found = inpaint(photo, loads(RING), mask=cell_hole(photo, RING, 4), method="patchmatch")
     assert any("unguided" in note for note in found.notes)
+    assert found.unlike == 0 and found.fallback == 1
 
 
 def test_without_pypatchmatch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,8 @@ import pytest
 from p3i import loads
 from p3i.errors import ProgramError
 from p3i.interp.camera import Camera
-from p3i.paint.placed import placed, straight
+from p3i.paint.flat import flat_of
+from p3i.paint.placed import placed
 from p3i.size import Size
 from p3i.vision.image import Image
 
@@ -69,8 +70,11 @@ def test_a_program_behind_the_camera_is_refused_by_name() -> None:
         placed(loads("SetCameraPose(rx=80, ry=0)\nfor i in range(0, 3):\n    Draw(x=i, y=-900)\n"), blank())
 
 
-def test_a_photo_is_straightened_only_where_the_header_names_a_lens() -> None:
+def test_a_photo_is_laid_flat_only_where_the_header_names_a_lens() -> None:
     photo = blank()
-    assert straight(photo, loads(LATTICE)) is photo
+    assert flat_of(photo, loads(LATTICE)).photo is photo
     bent = loads("# /// p3p\n# version = 1\n# lens_k1 = -0.1\n# ///\n" + LATTICE)
-    assert straight(photo, bent) is not photo
+    flat = flat_of(photo, bent)
+    # Seen straight a corner lies 1 / (1 + k1) times as far out, and the canvas holds it.
+    assert flat.photo.size.width == pytest.approx(400 / 0.9, abs=2)
+    assert flat.seen.any() and not flat.seen[0, flat.photo.size.width // 2]

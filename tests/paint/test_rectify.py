@@ -180,6 +180,16 @@ def test_too_many_pixels_are_scaled_down_or_where_a_scale_was_asked_for_refused(
         rectify(blank(), loads(LATTICE), max_px=20_000, scale=1.0)
 
 
+@pytest.mark.parametrize("crop", ["pattern", "same"])
+def test_a_limit_of_any_number_of_pixels_is_kept_and_made_use_of(crop: str) -> None:
+    """A row ten times as long as high: rounding its short side up must not break the limit."""
+    row = LATTICE.replace("range(-3, 4)", "range(0, 1)", 1)
+    for limit in (1, 2, 3, 7, 20, 50, 99, 101, 333, 1000, 2001, 5003):
+        for text in (LATTICE, row):
+            size = rectify(blank(), loads(text), crop=crop, max_px=limit).size
+            assert 0.3 * limit <= size.width * size.height <= limit
+
+
 def test_a_known_cell_makes_the_view_metric_whatever_the_focal() -> None:
     for focal_mm in (24.0, 35.0, 70.0):
         found = rectify(blank(), loads(LATTICE), cell=CellSize(600, 300), focal_mm=focal_mm)

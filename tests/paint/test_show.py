@@ -61,6 +61,11 @@ def test_the_extent_runs_round_all_cells_once() -> None:
     assert {len(line.segments) for line in lines} == {2 * (12 + 8)}
 
 
+def test_the_pictures_that_a_program_names_are_not_laid_over_its_photo() -> None:
+    named = BOARD.replace("Draw(", 'Draw("nowhere.png", ')
+    assert np.array_equal(show(grey(), loads(named)).pixels(), show(grey(), loads(BOARD)).pixels())
+
+
 def test_an_unknown_option_is_refused_by_name() -> None:
     with pytest.raises(UsageError, match="no option 'lables'"):
         show(grey(), loads(BOARD), lables="none")

@@ -51,6 +51,18 @@ def test_a_turned_copy_has_the_same_focal():
     assert focal_from_exif(exif_of(**tags), Size(3000, 4000)).focal_mm == pytest.approx(27.04, abs=0.01)
 
 
+@pytest.mark.parametrize(("figure", "exact"), [(26, True), (25, False), (27, False)])
+def test_what_the_figure_was_rounded_from_wins_over_it_where_the_sensor_tells(
+    figure: int, exact: bool
+) -> None:
+    """A sensor that gives 26.4 mm beside a figure of 26 is that lens; beside others it is a mistake."""
+    f_px = 26.4 * 5000 / 43.27
+    tags = {"focal": 4.2, "plane_x": f_px / 4.2, "unit": 4, "width": 4000, "height": 3000}
+    found = focal_from_exif(exif_of(equivalent=figure, **tags), FULL).focal_mm
+    expected = f_px if exact else figure * 5000 / 43.27
+    assert found == pytest.approx(expected * 36 / 4000, rel=1e-6)
+
+
 def test_a_cropped_picture_has_no_known_focal():
     found = focal_from_exif(exif_of(equivalent=26, width=4000, height=3000), Size(2000, 2000))
     assert found.focal_mm is None

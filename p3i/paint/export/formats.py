@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from p3i.errors import UsageError
-from p3i.grammar.printer import format_program
+from p3i.grammar.printer import format_program, number_text
 from p3i.paint.export.coco import coco
 from p3i.paint.export.dxf import dxf
 from p3i.paint.export.geojson import geojson
@@ -27,12 +27,15 @@ def encode(found: Objects, form: str) -> bytes:
 
 
 def table(found: Objects) -> str:
-    """CSV: a line an object, its cell as WKT; pixel centres at whole numbers, rows and columns from 1."""
+    """CSV: a line an object, its cell as WKT; pixel centres at whole numbers, rows and columns from 1.
+
+    Numbers are as short as they can be and still read back the same, as in programs.
+    """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
     for each in found.objects:
-        presence = "" if each.presence is None else each.presence
+        presence = "" if each.presence is None else number_text(each.presence)
         writer.writerow(
             [
                 each.name,
@@ -40,10 +43,7 @@ def table(found: Objects) -> str:
                 each.column + 1,
                 each.i,
                 each.j,
-                each.x_px,
-                each.y_px,
-                each.x,
-                each.y,
+                *map(number_text, (each.x_px, each.y_px, each.x, each.y)),
                 presence,
                 str(each.inside).lower(),
                 _wkt(each.cell_px),
@@ -93,7 +93,11 @@ def lines(found: dict[str, Any], key: str) -> str:
 def _wkt(polygon: Polygon) -> str:
     if not polygon:
         return "POLYGON EMPTY"
-    return "POLYGON ((" + ", ".join(f"{x:g} {y:g}" for x, y in (*polygon, polygon[0])) + "))"
+    return (
+        "POLYGON (("
+        + ", ".join(f"{number_text(x)} {number_text(y)}" for x, y in (*polygon, polygon[0]))
+        + "))"
+    )
 
 
 _WRITERS: dict[str, Callable[[Objects], str]] = {

@@ -4,14 +4,13 @@ Convention: pixel centres at whole numbers, the view box begins at (-0.5, -0.5),
 object is a group `object-NAME`.
 """
 
+from p3i.grammar.printer import format_program, number_text
 from p3i.paint.objects import Objects
 from p3i.paint.svg import number, program_element
 
 
 def svg(found: Objects) -> str:
     """`found` as an SVG document, with the text of its program in the metadata."""
-    from p3i.grammar.printer import format_program
-
     width, height = found.size.width, found.size.height
     stroke = max(1.0, found.size.longer / 800)
     lines = [
@@ -28,13 +27,14 @@ def svg(found: Objects) -> str:
             facts += f' data-presence="{each.presence}"'
         lines.append(f'<g id="object-{each.name}" {facts}>')
         if each.cell_px:
-            corners = " ".join(f"{number(x)},{number(y)}" for x, y in each.cell_px)
+            corners = " ".join(f"{number_text(x)},{number_text(y)}" for x, y in each.cell_px)
             lines.append(f'<polygon points="{corners}"/>')
-        at = f'x="{number(each.x_px)}" y="{number(each.y_px)}"'
+        x, y = number_text(each.x_px), number_text(each.y_px)
         size = number(_text_size(each.cell_px, stroke))
         lines += [
-            f'<circle cx="{number(each.x_px)}" cy="{number(each.y_px)}" r="{number(1.5 * stroke)}"/>',
-            f'<text {at} dy="-0.5em" font-size="{size}" fill="#d62839" stroke="none">{each.name}</text>',
+            f'<circle cx="{x}" cy="{y}" r="{number(1.5 * stroke)}"/>',
+            f'<text x="{x}" y="{y}" dy="-0.5em" font-size="{size}" fill="#d62839" stroke="none">'
+            f"{each.name}</text>",
             "</g>",
         ]
     return "\n".join([*lines, "</g>", "</svg>", ""])

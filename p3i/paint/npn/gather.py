@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from p3i.paint.matching import carried, matched_light, shift_step, trusted
+from p3i.paint.matching import aligned, matched_light, membrane, rim_of, trusted, weighted_misfit
 from p3i.paint.npn.window import Bank, grid, project, step_px
 
 # The surroundings that sources are weighed on reach this far, in distances between cells.
@@ -31,8 +31,8 @@ _LEAST_KNOWN = 0.3
 _LEAST_HOME = 0.6
 # No source counts for nothing: the network starts from the logarithms.
 _LEAST_WEIGHT = 1e-4
-# The membrane lifts or lowers by at most this.
-_MOST_LIFT = 0.15
+# The rim at which the membranes hang, in pixels of the window.
+_RIM_PX = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +88,7 @@ def gather(bank: Bank, hole: np.ndarray, *, target: int = 0, most: int = 10) -> 
     if not able:
         return None
     rough = [
-        _matched(bank.pixels[place][rows, columns], wanted, closeness * known[place][rows, columns])[2]
+        _unlike(bank.pixels[place][rows, columns], wanted, closeness * known[place][rows, columns])
         for place in able
     ]
     likeliest = [able[place] for place in np.argsort(rough, kind="stable")[:_MOST_ALIGNED]]
@@ -119,13 +119,10 @@ def _hidden(bank: Bank, hole: np.ndarray, target: int, place: int) -> np.ndarray
     return cv2.warpPerspective(wide, matrix, size, flags=flags, borderMode=cv2.BORDER_CONSTANT) > 0
 
 
-def _matched(
-    source: np.ndarray, wanted: np.ndarray, trust: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Gain [3] and offset [3] that bring `source` [N, 3] near `wanted`, and the mean difference left."""
+def _unlike(source: np.ndarray, wanted: np.ndarray, trust: np.ndarray) -> float:
+    """The mean difference that is left of `source` [K, 3] to `wanted` [K, 3] in its light."""
     gain, offset = matched_light(source, wanted, trust)
-    off = trust[:, None] * np.abs(gain * source + offset - wanted)
-    return gain, offset, float(off.sum() / max(float(trust.sum()), 1e-9) / 3)
+    return weighted_misfit(wanted - (gain * source + offset), trust)
 
 
 def _aligned(
@@ -134,27 +131,13 @@ def _aligned(
     """Shift [2] in window pixels, gain, offset and error of one source, by Lucas-Kanade."""
     matrix = bank.photo_from_window[place]
     step = step_px(matrix, bank.window)
-    most = _MOST_SHIFT * bank.window.pitch
 
     def read(shift: np.ndarray) -> np.ndarray:
         return bank.pyramid.read(project(matrix, points + shift), step_px=step)
 
     # The slopes hardly change over so short a way: they are read once.
-    right, left_of = read(np.array([0.5, 0])), read(np.array([-0.5, 0]))
-    below, above = read(np.array([0, 0.5])), read(np.array([0, -0.5]))
-    shift, best = np.zeros(2), None
-    for turn in range(4):
-        source = read(shift)
-        gain, offset, error = _matched(source, wanted, trust)
-        if best is None or error < best[3]:
-            best = (shift, gain, offset, error)
-        if turn == 3:
-            break
-        left = wanted - (gain * source + offset)
-        slopes = gain * (right - left_of), gain * (below - above)
-        shift = np.clip(shift + shift_step(slopes, left, trust), -most, most)
-    assert best is not None
-    return best
+    slopes = [read(half) - read(-half) for half in np.array([(0.5, 0.0), (0.0, 0.5)])]
+    return aligned(read, lambda _: slopes, wanted, trust, most_px=_MOST_SHIFT * bank.window.pitch)
 
 
 def _stacked(bank: Bank, hole: np.ndarray, target: int, chosen: list, seen: tuple) -> Stack:
@@ -170,7 +153,8 @@ def _stacked(bank: Bank, hole: np.ndarray, target: int, chosen: list, seen: tupl
         source = (gain * read + offset).astype(np.float32)
         columns, rows = points.astype(int).T
         differences.append(np.where(known[rows, columns][:, None], source[rows, columns] - wanted, 0))
-        lifts.append(membrane(bank.pixels[target] - source, hole, context & known, pitch=window.pitch))
+        rim = rim_of(hole, context & known, reach_px=_RIM_PX)
+        lifts.append(membrane(bank.pixels[target] - source, rim, spacing_px=window.pitch))
         sources.append(source)
         knowns.append(known)
         matrices.append(matrix)
@@ -189,14 +173,3 @@ def _stacked(bank: Bank, hole: np.ndarray, target: int, chosen: list, seen: tupl
         np.stack([fit[2] for _, _, fit in chosen]).astype(np.float32),
         errors.astype(np.float32),
     )
-
-
-def membrane(difference: np.ndarray, hole: np.ndarray, known: np.ndarray, *, pitch: float) -> np.ndarray:
-    """What the rim of a hole lacks, carried inwards: [h, w, 3], 0 where no rim is known.
-
-    `difference` [h, w, 3] is read on the known pixels within two of the hole; far rims count less.
-    """
-    far = np.asarray(cv2.distanceTransform((~hole).astype(np.uint8), cv2.DIST_L2, 5))
-    rim = (known & (far <= 2.0) & ~hole).astype(np.float32)
-    off = np.clip(difference, -_MOST_LIFT, _MOST_LIFT).astype(np.float32) * rim[:, :, None]
-    return carried(off, rim, spacing_px=pitch)

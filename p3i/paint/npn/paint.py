@@ -2,12 +2,14 @@
 
 import time
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import cv2
 import numpy as np
 import torch
 
 from p3i.errors import UsageError
+from p3i.paint.filled import Filled, share_text
 from p3i.paint.npn import checkpoint
 from p3i.paint.npn.gather import Stack, gather
 from p3i.paint.npn.lessons import batch_of, lessons
@@ -33,19 +35,20 @@ def paint(
     options: NetworkOptions,
     *,
     progress: Progress | None = None,
-) -> np.ndarray:
+) -> Filled:
     """The photo [H, W, 3] float32 with the hole (bool [H, W]) filled; pixels outside stay bit-identical.
 
     The network starts from the stack's fill and adds what it has learned. Each part of the hole that hangs
     together is learned for on its own, with an equal share of the time; a part that too few other cells show
-    stays as the stack fills it. Pixels of the hole are never read. `progress` is told the step, of how many,
-    and the latest mean L1 (0 to 255). Raises ValueError for a hole of another size, UsageError for a device
-    that is not there, FileError for a checkpoint that is not of this photo and hole.
+    stays as the stack fills it, and `notes` says so. Pixels of the hole are never read. `progress` is told
+    the step, of how many, and the latest mean L1 (0 to 255). Raises ValueError for a hole of another size,
+    UsageError for a device that is not there, FileError for a checkpoint of another photo and hole.
     """
     if hole.shape != photo.valid.shape or hole.dtype != np.bool_:
         raise ValueError(f"the hole is bool {photo.valid.shape}, not {hole.dtype} {hole.shape}")
     device = _device(options.device)
-    result, _ = fill_by_stack(photo.pixels, photo.valid, hole, placed)
+    result, bare = fill_by_stack(photo.pixels, photo.valid, hole, placed)
+    untaught, useless = bare.copy(), np.zeros_like(hole)
     pyramid = Pyramid(replace(photo, valid=photo.valid & ~hole))
     key = checkpoint.fingerprint(photo, placed, hole, options) if options.checkpoint else ""
     begin = time.monotonic()
@@ -55,9 +58,21 @@ def paint(
             part = labels == place
             until = None if options.time_s is None else begin + options.time_s * place / (count - 1)
             turn = _Turn(place, count - 1, key, until, device, progress)
-            change = _change(pyramid, placed, (part, result[part]), options, turn)
-            result[part] = np.clip(result[part] + change, 0, 1)
-    return result
+            outcome = _change(pyramid, placed, (part, result[part]), options, turn)
+            if isinstance(outcome, str):
+                (untaught if outcome == "untaught" else useless)[part] = True
+            else:
+                result[part] = np.clip(result[part] + outcome, 0, 1)
+    notes: list[str] = []
+    if of_hole := share_text(bare, hole):
+        notes.append(f"for {of_hole} the program has nothing like it: the surroundings are continued")
+    if of_hole := share_text(untaught & ~bare, hole):
+        notes.append(
+            f"for {of_hole} too few other cells show the like to learn from: the stack's fill stands"
+        )
+    if of_hole := share_text(useless & ~bare, hole):
+        notes.append(f"for {of_hole} the network learned nothing that helps: the stack's fill stands")
+    return Filled(result, bare, untaught | useless, tuple(notes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,19 +97,18 @@ def _change(
     piece: tuple[np.ndarray, np.ndarray],
     options: NetworkOptions,
     turn: _Turn,
-) -> np.ndarray:
-    """What the network adds [P, 3] to the stack's fill of one part of the hole: 0 where it knows nothing.
+) -> "np.ndarray | Literal['untaught', 'useless']":
+    """What the network adds [L, 3] to the stack's fill of one part of the hole, or why it adds nothing.
 
-    `piece`: the part, bool [H, W], and the colours [P, 3] that the stack has filled it with.
+    `piece`: the part, bool [H, W], and the colours [L, 3] that the stack has filled it with.
     """
     part, filled = piece
-    nothing = np.zeros((int(part.sum()), 3), np.float32)
     window = window_of(placed, part, working_px=options.working_px)
     bank = bank_of(pyramid, placed, window)
     seen = part_on_window(part, window)
     stack = gather(bank, seen, most=options.sources)
     if stack is None:
-        return nothing
+        return "untaught"
     training = begun(seed=options.seed, device=turn.device)
     path = options.checkpoint
     if path is not None:
@@ -108,7 +122,7 @@ def _change(
             bank, seen, count=options.examples, most=options.sources, seed=options.seed, until=stop
         )
         if not learned:
-            return nothing
+            return "untaught"
         train(
             training,
             learned,
@@ -121,7 +135,7 @@ def _change(
             progress=turn.told,
         )
     if not training.best_weights or training.best_share == 0:
-        return nothing
+        return "useless"
     training.mean.load_state_dict(training.best_weights)
     batch = batch_of([stack], device=turn.device)
     before = _composed(bank, stack, plain(batch), part)
@@ -157,7 +171,7 @@ def part_on_window(part: np.ndarray, window: Window) -> np.ndarray:
 
 
 def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.ndarray:
-    """The colours [P, 3] of one part's pixels, at the photo's size, from what was said on the window's.
+    """The colours [L, 3] of one part's pixels, at the photo's size, from what was said on the window's.
 
     Attention, strength, membranes and correction are smooth enough to be magnified; the sources are read
     anew, so that detail finer than the window's is kept.
@@ -168,7 +182,7 @@ def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.n
     core = (places - [window.core[1].start, window.core[0].start]).astype(np.float32)
 
     def magnified(planes: np.ndarray) -> np.ndarray:
-        """[C, h, w] read at the hole's pixels: [P, C]."""
+        """[C, h, w] read at the hole's pixels: [L, C]."""
         return np.stack([taken(np.ascontiguousarray(plane), core) for plane in planes], axis=1)
 
     attention = magnified(said.attention[0, :, 0].cpu().numpy())

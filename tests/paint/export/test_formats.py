@@ -4,7 +4,7 @@ import contextlib
 import csv
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -67,6 +67,35 @@ def test_csv_has_a_line_for_each_well() -> None:
     assert [row["name"] for row in rows] == [f"{a}{k}" for a in "ABCDEFGH" for k in range(1, 13)]
     assert rows[13] | {"row": "2", "column": "2", "i": "1", "j": "1", "presence": ""} == rows[13]
     assert rows[0]["cell_px"].startswith("POLYGON ((")
+
+
+def test_all_formats_keep_every_digit_of_places_on_a_large_photo() -> None:
+    """On 40,000 pixels a place to a thousandth has eight digits, and none is lost on the way into a file."""
+    text = HEAD.replace("[640, 480]", "[40000, 30000]") + BOARD
+    found = p3i.points(p3i.loads(text))
+    last = found.objects[-1]
+    places = {number for corner in last.cell_px for number in corner} | {last.x_px, last.y_px}
+    assert max(places) > 10_000 and any(round(place, 1) != place for place in places)
+    row = list(csv.DictReader(io.StringIO(found.encode("csv").decode())))[-1]
+    corners = [tuple(map(float, pair.split())) for pair in row["cell_px"][10:-2].split(", ")]
+    assert corners == [*last.cell_px, last.cell_px[0]]
+    assert (float(row["x_px"]), float(row["y_px"]), float(row["x"])) == (last.x_px, last.y_px, last.x)
+    record = json.loads(found.encode("json"))["objects"][-1]
+    assert [tuple(corner) for corner in record["cell_px"]] == list(last.cell_px)
+    for form, moved in (("labelme", places), ("geojson", places), ("coco", places - {last.x_px, last.y_px})):
+        numbers = set(numbers_in(json.loads(found.encode(form))))
+        assert {round(place + 0.5, 3) for place in moved} <= numbers, form
+    drawing = found.encode("svg").decode()
+    assert all(number.rstrip("0").rstrip(".") in drawing for number in (f"{place:.3f}" for place in places))
+
+
+def numbers_in(value: object) -> Iterator[float]:
+    """All numbers of a JSON value."""
+    if isinstance(value, dict | list):
+        for part in value.values() if isinstance(value, dict) else value:
+            yield from numbers_in(part)
+    elif isinstance(value, int | float):
+        yield float(value)
 
 
 def test_json_holds_the_program_that_drew_it() -> None:

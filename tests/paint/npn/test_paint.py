@@ -9,6 +9,7 @@ import torch
 from painted import Scene, bank, scene, stacks
 
 from p3i.errors import FileError, UsageError
+from p3i.paint.npn import training
 from p3i.paint.npn.lessons import batch_of, lessons
 from p3i.paint.npn.network import plain
 from p3i.paint.npn.options import NetworkOptions
@@ -25,8 +26,8 @@ def photo() -> Scene:
 
 
 def test_the_hole_alone_changes_and_equal_seeds_paint_equal_pictures(photo: Scene) -> None:
-    one = paint(photo.corrupted, photo.placed, photo.hole, SHORT)
-    other = paint(photo.photo, photo.placed, photo.hole, SHORT)
+    one = paint(photo.corrupted, photo.placed, photo.hole, SHORT).pixels
+    other = paint(photo.photo, photo.placed, photo.hole, SHORT).pixels
     assert one.dtype == np.float32
     assert (one[~photo.hole] == photo.photo.pixels[~photo.hole]).all()
     # Nor does what the hole hides make a difference.
@@ -36,7 +37,7 @@ def test_the_hole_alone_changes_and_equal_seeds_paint_equal_pictures(photo: Scen
 
 def test_a_training_that_was_cut_off_goes_on_to_the_same_picture(photo: Scene, tmp_path: Path) -> None:
     options = replace(SHORT, steps=EVERY + 8, adversarial=0.01)
-    whole = paint(photo.photo, photo.placed, photo.hole, options)
+    whole = paint(photo.photo, photo.placed, photo.hole, options).pixels
     assert np.abs(
         whole - fill_by_stack(photo.photo.pixels, photo.photo.valid, photo.hole, photo.placed)[0]
     ).max()
@@ -49,10 +50,12 @@ def test_a_training_that_was_cut_off_goes_on_to_the_same_picture(photo: Scene, t
     with pytest.raises(KeyboardInterrupt):
         paint(photo.photo, photo.placed, photo.hole, kept, progress=cut)
     steps: list[int] = []
-    resumed = paint(photo.photo, photo.placed, photo.hole, kept, progress=lambda step, *_: steps.append(step))
+    resumed = paint(
+        photo.photo, photo.placed, photo.hole, kept, progress=lambda step, *_: steps.append(step)
+    ).pixels
     assert steps[0] == EVERY + 1
     np.testing.assert_array_equal(resumed, whole)
-    read_back = paint(photo.photo, photo.placed, photo.hole, kept)
+    read_back = paint(photo.photo, photo.placed, photo.hole, kept).pixels
     np.testing.assert_array_equal(read_back, whole)
 
 
@@ -110,6 +113,19 @@ def test_targets_of_lessons_are_known_and_their_holes_hidden_in_the_sources(phot
             shown = known & stack.hole
             assert shown.any()
             assert np.abs(source - stack.target)[shown].mean() > 1e-3
+
+
+def test_a_training_that_helps_nobody_leaves_the_stacks_fill_and_says_so(
+    photo: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(training, "_SHARES", (0.0,))  # whatever is learned, the judges want none of it
+    found = paint(photo.photo, photo.placed, photo.hole, SHORT)
+    stack, _ = fill_by_stack(photo.photo.pixels, photo.photo.valid, photo.hole, photo.placed)
+    assert np.array_equal(found.pixels, stack)
+    assert np.array_equal(found.fallback, photo.hole) and not found.unlike.any()
+    assert found.notes == (
+        "for 100% of the hole the network learned nothing that helps: the stack's fill stands",
+    )
 
 
 def test_time_stops_the_training(photo: Scene) -> None:
