@@ -30,6 +30,7 @@ from p3i.search.evidence import Evidence
 from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing, turning
 from p3i.search.score import without_doubles
 from p3i.search.session import Answer
+from p3i.search.thinned import thinned
 
 # Samples of a patch that count as independent of each other: about 7 x 7; in a small patch, pixels two apart.
 _SAMPLES = 50.0
@@ -107,7 +108,7 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return Explained(-cost, cost, len(index), torch.zeros(0), torch.zeros(0, 2), torch.zeros(0))
-    part = slice(None, None, len(index) // _MOST_JUDGED + 1)
+    part = thinned(index, _MOST_JUDGED)
     judged = index[part]
     side = _patch_side(pattern)
     found = patch_contrast(evidence, pattern, pattern.theta, judged, side=side, focal_mm=focal_mm)

@@ -25,6 +25,7 @@ from p3i.search.patches import find_objects, frames, spacing
 from p3i.search.refine import free_numbers
 from p3i.search.register import robust_fit
 from p3i.search.session import Answer, Session
+from p3i.search.thinned import thinned
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.warp import in_frame, pixel_grid, remapped
@@ -121,7 +122,7 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
     matrix = pattern.image_from_plane(size=canvas, focal_mm=focal_mm)
     points, in_front = project(matrix, pattern.points_at(index))
     index = index[in_front & in_frame(points, canvas)]
-    index = index[:: len(index) // _MOST_OBJECTS + 1]
+    index = index[thinned(index, _MOST_OBJECTS)]
     if len(index) < _FEWEST_OBJECTS:
         return None
     side = spacing(pattern, theta)

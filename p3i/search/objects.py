@@ -18,6 +18,7 @@ from p3i.search.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.phase import find_phase
 from p3i.search.register import find_instances, fit_instances
 from p3i.search.score import MOST_JUDGED, judged_contrast, judging_features, score_of
+from p3i.search.thinned import thinned
 from p3i.vision.warp import in_frame
 
 # Numbers in a program: angles to a thousandth of a degree, lengths to a ten-thousandth of a unit, which is
@@ -153,7 +154,7 @@ def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> 
     index = _drawn_cells(level, pattern, layout, theta)
     if len(index) < 4:
         return None
-    index = index[:: len(index) // MOST_JUDGED + 1]
+    index = index[thinned(index, MOST_JUDGED)]
     return weighed(level, pattern, theta, index, judged_contrast(level, pattern, theta, index))
 
 
@@ -177,7 +178,7 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     index = _drawn_cells(level, pattern, layout, theta, cut=True)
     if len(index) < _FEWEST_REFITTED:
         return layout
-    index = index[:: len(index) // _MOST_REFITTED + 1]
+    index = index[thinned(index, _MOST_REFITTED)]
     weights = torch.ones(len(index))
     for _ in range(_REFITS):
         found = find_instances(level, pattern, theta, index, weights, side=_SIDE)

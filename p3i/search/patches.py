@@ -23,6 +23,7 @@ from p3i.interp.unroll import nest
 from p3i.search.cells import HALF_STEPS, Cells, Contrast, contrast_of
 from p3i.search.evidence import ColourMap, Evidence
 from p3i.search.register import Instances, correlate, mean_of_others
+from p3i.search.thinned import thinned
 from p3i.vision.warp import sample, sample_valid
 
 SIDE = 14
@@ -32,7 +33,9 @@ REACH = 5
 # Loop indices this far apart give the direction of the curve.
 _TANGENT_STEP = 0.02
 # More draws than this are not needed to say how far apart draws are.
-_MOST_MEASURED = 400
+_MOST_MEASURED, _FEWEST_MEASURED = 400, 20
+# ... each against all others, so many distances at most.
+_MOST_DISTANCES = 2_000_000
 # Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
 _FLOOR = 0.4
 
@@ -69,9 +72,8 @@ def spacing(pattern: Pattern, theta: Tensor) -> float:
     Draws that coincide count once.
     """
     centers = pattern.centers(theta)
-    centers = centers[:: len(centers) // _MOST_MEASURED + 1] if len(centers) > 2000 else centers
-    few = centers[:: len(centers) // _MOST_MEASURED + 1]
-    distance = torch.cdist(few, centers)
+    most = max(_FEWEST_MEASURED, min(_MOST_MEASURED, _MOST_DISTANCES // max(len(centers), 1)))
+    distance = torch.cdist(centers[thinned(pattern.index, most)], centers)
     distance = torch.where(distance > 1e-6, distance, torch.inf).amin(1)
     finite = distance[torch.isfinite(distance)]
     return float(finite.median()) if len(finite) else 1.0

@@ -15,6 +15,7 @@ from p3i.search.config import SearchConfig
 from p3i.search.evidence import FINE, Evidence, Level
 from p3i.search.lens import scaled, straightened
 from p3i.search.patches import half_steps, patch_contrast, spacing
+from p3i.search.thinned import thinned
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
@@ -72,7 +73,7 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
 def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -> float:
     """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`."""
     index = pattern.index[seen].double()
-    index = index[:: len(index) // MOST_JUDGED + 1]
+    index = index[thinned(index, MOST_JUDGED)]
     steps = half_steps(pattern)
     if len(steps) < len(HALF_STEPS):  # one loop sweeps no cells: patches about the draws are compared
         side = spacing(pattern, pattern.theta)
