@@ -24,6 +24,8 @@ _SHARE_NOISE = 0.03
 _PIXEL_NOISE = 0.3
 # Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise.
 _FOCAL_SPREAD = 0.35
+# The certainty of a focal that is held.
+_HELD = 1e12
 # One step moves angles by at most so many degrees, lengths by this share of a patch, the focal's logarithm
 # by this.
 _MOST_TURN_DEG = 4.0
@@ -107,26 +109,38 @@ def registered(
         seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[..., -1].exp())
         return project(seen, pattern.points_at(fit.index, theta))[0]
 
-    start = torch.cat([fit.z, torch.tensor([math.log(fit.focal_mm)], dtype=torch.float64)])
-    free = torch.zeros(len(start), 2, dtype=torch.float64)
-    free[:, 0] = start
-    free[-1, 0] = math.log(evidence.focal_mm)
-    free[-1, 1] = 1 / _FOCAL_SPREAD**2 if free_focal else 1e12
-    numbers = robust_fit(
-        points_of,
-        start,
-        targets=targets,
-        whiten=whiten,
-        weights=certainty,
-        limits=_limits(fit),
-        prior=free,
-        iterations=8,
-    )
+    def fitted(focal_mm: float, *, expected_mm: float, certainty_of_focal: float) -> Tensor:
+        start = torch.cat([fit.z, torch.tensor([math.log(focal_mm)], dtype=torch.float64)])
+        prior = torch.zeros(len(start), 2, dtype=torch.float64)
+        prior[-1, 0], prior[-1, 1] = math.log(expected_mm), certainty_of_focal
+        return robust_fit(
+            points_of,
+            start,
+            targets=targets,
+            whiten=whiten,
+            weights=certainty,
+            limits=_limits(fit),
+            prior=prior,
+            iterations=8,
+        )
+
+    def under(focal_mm: float) -> Tensor:
+        return fitted(focal_mm, expected_mm=focal_mm, certainty_of_focal=_HELD)
+
+    focal_mm = fit.focal_mm
+    if free_focal:
+        expected = evidence.focal_mm
+        numbers = fitted(focal_mm, expected_mm=expected, certainty_of_focal=1 / _FOCAL_SPREAD**2)
+        told = float(numbers[-1].exp())
+        focal_mm = min(max(told, FOCALS_MM[0]), FOCALS_MM[1])
+        if focal_mm != told and math.isfinite(
+            told
+        ):  # the other numbers are to belong to the focal that stays
+            numbers = under(focal_mm)
+    else:
+        numbers = under(focal_mm)
     if not bool(torch.isfinite(numbers).all()):
         return None
-    focal_mm = (
-        min(max(math.exp(float(numbers[-1])), FOCALS_MM[0]), FOCALS_MM[1]) if free_focal else fit.focal_mm
-    )
     residual = torch.einsum("nij,nj->ni", whiten, points_of(numbers) - targets)
     cost = float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())
     side = fit.side if keep_side else None
