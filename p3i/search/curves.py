@@ -13,15 +13,12 @@ from torch import Tensor
 from p3i.interp.camera import project
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
-from p3i.search.patches import Frames, find_objects, frames, patch_contrast, spacing
+from p3i.search.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
 from p3i.search.register import robust_fit
-from p3i.search.score import mean_contrast, score_of_curve
+from p3i.search.score import mean_contrast, placed_right, score_of_curve
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
-# An object's place is known to this share of a patch's side, and no better than this many pixels.
-_SHARE_NOISE = 0.03
-_PIXEL_NOISE = 0.3
 # Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise.
 _FOCAL_SPREAD = 0.35
 # The certainty of a focal that is held.
@@ -32,8 +29,6 @@ _MOST_TURN_DEG = 4.0
 _MOST_SHIFT = 0.4
 _MOST_ZOOM = 0.15
 _FEWEST = 3
-# A misfit of the objects' places beyond this one counts like it.
-_WORST = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +60,7 @@ class CurveFit:
     @property
     def quality(self) -> float:
         """The mean contrast, less where the objects do not stand where the program draws."""
-        return self.mean * math.exp(-min(self.cost, _WORST))
+        return placed_right(self.mean, self.cost)
 
 
 def measured(
@@ -102,7 +97,7 @@ def registered(
     where = frames(pattern, fit.theta, fit.index, side=fit.side)
     matrix = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm)
     targets, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
-    whiten = _whitening(matrix, where)
+    whiten = whitening(matrix, where)
 
     def points_of(numbers: Tensor) -> Tensor:
         theta = filling.theta(numbers[..., :-1])
@@ -141,8 +136,7 @@ def registered(
         numbers = under(focal_mm)
     if not bool(torch.isfinite(numbers).all()):
         return None
-    residual = torch.einsum("nij,nj->ni", whiten, points_of(numbers) - targets)
-    cost = float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())
+    cost = misfit(points_of(numbers) - targets, whiten=whiten, certainty=certainty)
     side = fit.side if keep_side else None
     moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm, side=side)
     return None if moved is None else replace(moved, cost=cost)
@@ -169,19 +163,6 @@ def follow(
 def curve_score(fit: CurveFit) -> float:
     """The score, 0 to 1, of a program that was fitted: `score_of_curve` of its quality."""
     return score_of_curve(fit.quality, len(fit.contrast))
-
-
-def _whitening(matrix: Tensor, where: Frames) -> Tensor:
-    """[N, 2, 2]: differences in pixels to differences in units of their noise, along and across."""
-    columns = []
-    for axis in (where.along, where.across):
-        ahead, _ = project(matrix, where.origin + 0.1 * axis)
-        behind, _ = project(matrix, where.origin - 0.1 * axis)
-        columns.append((ahead - behind) / 0.2)
-    px_from_side = torch.stack(columns, 2)
-    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
-    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
-    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
 
 
 def _limits(fit: CurveFit) -> Tensor:

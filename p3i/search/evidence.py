@@ -105,6 +105,14 @@ class Evidence:
     _levels: dict[tuple[str, int, float], Level] = field(default_factory=dict)
     _colours: dict[int, ColourMap] = field(default_factory=dict)
 
+    def under(self, focal_mm: float) -> "Evidence":
+        """The same photo under another focal (mm); what does not depend on it is shared, not made again."""
+        if focal_mm == self.focal_mm:
+            return self
+        return Evidence(
+            self.image, self.config, focal_mm, self.on_photo, _maps=self._maps, _colours=self._colours
+        )
+
     def features(self, longer: int, *, name: str | None = None) -> FeatureMap:
         """The photo's features with the longer side reduced to `longer` pixels (never enlarged).
 

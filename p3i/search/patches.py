@@ -36,6 +36,9 @@ _TANGENT_STEP = 0.02
 _MOST_MEASURED, _FEWEST_MEASURED = 400, 20
 # ... each against all others, so many distances at most.
 _MOST_DISTANCES = 2_000_000
+# An object's place is known to this share of a patch's side, and no better than this many pixels.
+_SHARE_NOISE = 0.03
+_PIXEL_NOISE = 0.3
 # Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
 _FLOOR = 0.4
 
@@ -227,3 +230,25 @@ def find_objects(
     offsets, peak, lead = correlate(patches.values, known, templates)
     # Rows of a patch run across the curve, columns along it.
     return Instances(index, offsets.flip(1) / SIDE, peak, lead)
+
+
+def whitening(matrix: Tensor, where: Frames) -> Tensor:
+    """[N, 2, 2]: differences in pixels to differences in units of places' noise, along and across."""
+    columns = []
+    for axis in (where.along, where.across):
+        ahead, _ = project(matrix, where.origin + 0.1 * axis)
+        behind, _ = project(matrix, where.origin - 0.1 * axis)
+        columns.append((ahead - behind) / 0.2)
+    px_from_side = torch.stack(columns, 2)
+    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
+    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
+    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
+
+
+def misfit(difference: Tensor, *, whiten: Tensor, certainty: Tensor) -> float:
+    """How far objects lie from their places: a robust mean, 0 where all are there.
+
+    Shapes: difference [N, 2] in pixels; whiten [N, 2, 2], of `whitening`; certainty [N], not all 0.
+    """
+    residual = torch.einsum("nij,nj->ni", whiten, difference)
+    return float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())
