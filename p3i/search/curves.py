@@ -66,7 +66,7 @@ class CurveFit:
 def measured(
     evidence: Evidence, filling: Filling, z: Tensor, *, focal_mm: float, side: float | None = None
 ) -> CurveFit | None:
-    """How well the objects of a filled sketch predict each other; None for fewer than three in sight."""
+    """How well the objects of a filled sketch, z [F], predict each other; None for fewer than three."""
     theta = filling.theta(z)
     pattern = filling.pattern
     if side is None:

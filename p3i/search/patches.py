@@ -70,7 +70,7 @@ class Patches:
 
 
 def spacing(pattern: Pattern, theta: Tensor) -> float:
-    """The median distance of a draw to its nearest neighbour, in program units; 1 for a single draw.
+    """The median distance of a draw under theta [P] to its nearest, in program units; 1 for a single draw.
 
     Draws that coincide count once.
     """
@@ -129,7 +129,7 @@ def offsets_grid(count: int, *, samples_a_side: int = SIDE) -> Tensor:
 
 
 def sample_px(matrix: Tensor, where: Frames, *, side: int = SIDE) -> float:
-    """The median distance of a patch's samples in photo pixels; `matrix` takes program units to pixels."""
+    """The median distance of patches' samples in photo pixels; `matrix` [3, 3] takes units to these."""
     lengths = []
     middle, front = project(matrix, where.origin)
     for axis in (where.along, where.across):

@@ -1,4 +1,9 @@
-"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score."""
+"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score.
+
+The score is a function of photo and finished program (with the focal and the lens of its header) alone: what
+`synth` prints of its answers and what `p3i score` says. What each family knew besides while it searched only
+decides what it goes on with, and may refuse an answer that this score would let pass.
+"""
 
 import math
 from dataclasses import dataclass
