@@ -28,7 +28,8 @@ class Canvas:
 def view_canvas(map_from_plane: Array, size: Size, *, side: int, depth_range: float) -> Canvas | None:
     """The canvas of `side` pixels for a map of this size seen under a homography; None where no plane shows.
 
-    `map_from_plane` is [3, 3]. The view reaches to where things are `depth_range` times as far away as the nearest.
+    `map_from_plane` is [3, 3]. The view reaches to where things are `depth_range` times as far away as the
+    nearest.
     """
     x, y = np.meshgrid(np.linspace(0, size.width - 1, 17), np.linspace(0, size.height - 1, 17))
     plane = np.linalg.inv(map_from_plane) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
