@@ -171,7 +171,7 @@ NO_ENERGY: tuple[Replacement, ...] = (
     ("p3i.search.cells.agreement", difference_agreement),
     ("p3i.search.grow.agreement", difference_agreement),
     ("p3i.search.primitive.agreement", difference_agreement),
-    ("p3i.search.register.correlate", difference_correlate),
+    ("p3i.search.correlate.correlate", difference_correlate),
     ("p3i.search.propose.lattice.autocorrelation", difference_autocorrelation),
 )
 

@@ -72,7 +72,7 @@ class Alike:
 
 
 def working_size(pixels: Floats, valid: Mask, image_from_plane: Array) -> tuple[Floats, Mask, Array]:
-    """The photo, its mask and its homography brought down to the size that the search works at."""
+    """The photo [H, W, 3], its mask [H, W] and its homography [3, 3], at the size for the search."""
     scale = _LONGER_SIDE / max(valid.shape)
     if scale >= 1:
         return np.asarray(pixels, np.float32), valid, np.asarray(image_from_plane, float)

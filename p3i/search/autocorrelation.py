@@ -43,7 +43,7 @@ class ShiftPair:
 
 
 def autocorrelation(view: np.ndarray, weights: np.ndarray) -> Autocorrelation:
-    """2 sum w w' F.F' / sum w w' (|F|^2 + |F'|^2) over all shifts up to half the view.
+    """2 sum w w' F.F' / sum w w' (|F|^2 + |F'|^2) over all shifts up to half the view [H, W, C].
 
     w is the weight of a pixel, F its features, primes the shifted copy (DESIGN.md, 4.2).
     """

@@ -1,7 +1,7 @@
 """Choice: which of the programs found, of whatever structure, explains the photo best for what it costs.
 
-One measure for all, in bits (minimum description length, Rissanen 1978; the paper itself compares programs of
-one structure only, by its equation 2):
+Families are compared in bits (minimum description length, Rissanen 1978; the paper itself compares programs
+of one structure only, by its equation 2), each program by itself:
 
     worth = sum over the objects in sight but one of S/2 * log2(0.9 * (1 - half + e) / (1 - whole + e)) - cost
 
@@ -12,6 +12,10 @@ code saves half the logarithm of their ratio for each of S independent samples. 
 whatever is known, and the factor 0.9 takes off what the best of thousands of programs predicts of any picture
 by chance. One object is not counted, since the mean patch itself is learnt. What a program costs: its
 numbers, bounds and guards, written down to the precision that matters.
+
+That is not all that decides. Within a family the order is its own (lattices by the share of the picture that
+they explain, rings and hybrids by how surely they repeat). A hybrid that holds a ring is measured from that
+ring on (`_beyond`). And what a person asked for (a sketch, a start, the paper's recipe) needs no bits.
 """
 
 import math
@@ -30,6 +34,7 @@ from p3i.search.answer import Answer
 from p3i.search.evidence import Evidence
 from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing
 from p3i.search.score import without_doubles
+from p3i.search.thinned import thinned
 
 # Samples of a patch that count as independent of each other: about 7 x 7; in a small patch, pixels two apart.
 _SAMPLES = 50.0
@@ -107,7 +112,7 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return Explained(-cost, cost, len(index), torch.zeros(0), torch.zeros(0, 2), torch.zeros(0))
-    part = slice(None, None, len(index) // _MOST_JUDGED + 1)
+    part = thinned(index, _MOST_JUDGED)
     judged = index[part]
     side = _patch_side(pattern)
     found = patch_contrast(evidence, pattern, pattern.theta, judged, side=side, focal_mm=focal_mm)

@@ -83,7 +83,7 @@ class PointMaps:
         return self.map_from_photo @ seen
 
     def level(self, step_px: Tensor, share: float) -> Tensor:
-        """The blur for draws `step_px` map pixels apart, as places in `_SIGMAS`."""
+        """The blur for draws `step_px` [...] map pixels apart, as places [...] in `_SIGMAS`."""
         place = torch.round(2 * torch.log2((share * step_px).clamp(min=1e-3)))
         return place.clamp(0, len(_SIGMAS) - 1).long()
 

@@ -13,25 +13,22 @@ from torch import Tensor
 from p3i.interp.camera import project
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
-from p3i.search.patches import Frames, find_objects, frames, patch_contrast, spacing
+from p3i.search.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
 from p3i.search.robust import robust_fit
-from p3i.search.score import mean_contrast, score_of_curve
+from p3i.search.score import mean_contrast, placed_right, score_of_curve
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
-# An object's place is known to this share of a patch's side, and no better than this many pixels.
-_SHARE_NOISE = 0.03
-_PIXEL_NOISE = 0.3
 # Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise.
 _FOCAL_SPREAD = 0.35
+# The certainty of a focal that is held.
+_HELD = 1e12
 # One step moves angles by at most so many degrees, lengths by this share of a patch, the focal's logarithm
 # by this.
 _MOST_TURN_DEG = 4.0
 _MOST_SHIFT = 0.4
 _MOST_ZOOM = 0.15
 _FEWEST = 3
-# A misfit of the objects' places beyond this one counts like it.
-_WORST = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,13 +60,13 @@ class CurveFit:
     @property
     def quality(self) -> float:
         """The mean contrast, less where the objects do not stand where the program draws."""
-        return self.mean * math.exp(-min(self.cost, _WORST))
+        return placed_right(self.mean, self.cost)
 
 
 def measured(
     evidence: Evidence, filling: Filling, z: Tensor, *, focal_mm: float, side: float | None = None
 ) -> CurveFit | None:
-    """How well the objects of a filled sketch predict each other; None for fewer than three in sight."""
+    """How well the objects of a filled sketch, z [F], predict each other; None for fewer than three."""
     theta = filling.theta(z)
     pattern = filling.pattern
     if side is None:
@@ -100,35 +97,46 @@ def registered(
     where = frames(pattern, fit.theta, fit.index, side=fit.side)
     matrix = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm)
     targets, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
-    whiten = _whitening(matrix, where)
+    whiten = whitening(matrix, where)
 
     def points_of(numbers: Tensor) -> Tensor:
         theta = filling.theta(numbers[..., :-1])
         seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[..., -1].exp())
         return project(seen, pattern.points_at(fit.index, theta))[0]
 
-    start = torch.cat([fit.z, torch.tensor([math.log(fit.focal_mm)], dtype=torch.float64)])
-    free = torch.zeros(len(start), 2, dtype=torch.float64)
-    free[:, 0] = start
-    free[-1, 0] = math.log(evidence.focal_mm)
-    free[-1, 1] = 1 / _FOCAL_SPREAD**2 if free_focal else 1e12
-    numbers = robust_fit(
-        points_of,
-        start,
-        targets=targets,
-        whiten=whiten,
-        weights=certainty,
-        limits=_limits(fit),
-        prior=free,
-        iterations=8,
-    )
+    def fitted(focal_mm: float, *, expected_mm: float, certainty_of_focal: float) -> Tensor:
+        start = torch.cat([fit.z, torch.tensor([math.log(focal_mm)], dtype=torch.float64)])
+        prior = torch.zeros(len(start), 2, dtype=torch.float64)
+        prior[-1, 0], prior[-1, 1] = math.log(expected_mm), certainty_of_focal
+        return robust_fit(
+            points_of,
+            start,
+            targets=targets,
+            whiten=whiten,
+            weights=certainty,
+            limits=_limits(fit),
+            prior=prior,
+            iterations=8,
+        )
+
+    def under(focal_mm: float) -> Tensor:
+        return fitted(focal_mm, expected_mm=focal_mm, certainty_of_focal=_HELD)
+
+    focal_mm = fit.focal_mm
+    if free_focal:
+        expected = evidence.focal_mm
+        numbers = fitted(focal_mm, expected_mm=expected, certainty_of_focal=1 / _FOCAL_SPREAD**2)
+        told = float(numbers[-1].exp())
+        focal_mm = min(max(told, FOCALS_MM[0]), FOCALS_MM[1])
+        if focal_mm != told and math.isfinite(
+            told
+        ):  # the other numbers are to belong to the focal that stays
+            numbers = under(focal_mm)
+    else:
+        numbers = under(focal_mm)
     if not bool(torch.isfinite(numbers).all()):
         return None
-    focal_mm = (
-        min(max(math.exp(float(numbers[-1])), FOCALS_MM[0]), FOCALS_MM[1]) if free_focal else fit.focal_mm
-    )
-    residual = torch.einsum("nij,nj->ni", whiten, points_of(numbers) - targets)
-    cost = float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())
+    cost = misfit(points_of(numbers) - targets, whiten=whiten, certainty=certainty)
     side = fit.side if keep_side else None
     moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm, side=side)
     return None if moved is None else replace(moved, cost=cost)
@@ -165,19 +173,6 @@ def values_of(fit: CurveFit) -> dict[str, float]:
 def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:
     """The numbers of a filling [F] in its order."""
     return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
-
-
-def _whitening(matrix: Tensor, where: Frames) -> Tensor:
-    """[N, 2, 2]: differences in pixels to differences in units of their noise, along and across."""
-    columns = []
-    for axis in (where.along, where.across):
-        ahead, _ = project(matrix, where.origin + 0.1 * axis)
-        behind, _ = project(matrix, where.origin - 0.1 * axis)
-        columns.append((ahead - behind) / 0.2)
-    px_from_side = torch.stack(columns, 2)
-    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
-    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
-    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
 
 
 def _limits(fit: CurveFit) -> Tensor:

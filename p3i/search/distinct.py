@@ -1,6 +1,7 @@
 """Which answers say the same in other words: programs compared by where their objects lie on the photo."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -8,6 +9,7 @@ from torch import Tensor
 
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
+from p3i.search.thinned import thinned
 from p3i.size import Size
 from p3i.vision.warp import in_frame
 
@@ -17,6 +19,16 @@ _SAME_PLACE = 0.25
 _SAME_SET = 0.9
 # Of more objects so many are compared.
 _MOST_COMPARED = 2000
+# ... each with all of the other answer, so many distances at most.
+_MOST_DISTANCES = 4_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Objects on a photo: `points` [N, 2] in pixels, `index` [N, 2] their loop indices."""
+
+    points: Tensor
+    index: Tensor
 
 
 def distinct_answers(answers: Sequence[Answer], *, size: Size, focal_mm: float) -> list[Answer]:
@@ -25,35 +37,39 @@ def distinct_answers(answers: Sequence[Answer], *, size: Size, focal_mm: float) 
     `focal_mm` is the focal that was assumed, for answers without one of their own. Answers that draw nothing
     on the photo all mean the same.
     """
-    kept: list[tuple[Answer, Tensor]] = []
+    kept: list[tuple[Answer, Places]] = []
     for answer in answers:
-        places = _places(answer, size=size, focal_mm=answer.focal_mm or focal_mm)
+        places = places_of(answer, size=size, focal_mm=answer.focal_mm or focal_mm)
         if not any(same_meaning(places, others) for _, others in kept):
             kept.append((answer, places))
     return [answer for answer, _ in kept]
 
 
-def same_meaning(first: Tensor, second: Tensor) -> bool:
-    """Whether two sets of points, [N, 2] and [M, 2] in pixels, are the same objects."""
-    if len(first) == 0 or len(second) == 0:
-        return len(first) == len(second)
-    apart = torch.cdist(first, second)
-    return _covered(first, apart.amin(1)) > _SAME_SET and _covered(second, apart.amin(0)) > _SAME_SET
+def same_meaning(first: Places, second: Places) -> bool:
+    """Whether two sets of places are the same objects."""
+    if len(first.points) == 0 or len(second.points) == 0:
+        return len(first.points) == len(second.points)
+    return _covered(first, second) > _SAME_SET and _covered(second, first) > _SAME_SET
 
 
-def _covered(points: Tensor, distance: Tensor) -> float:
-    """The share of points [N, 2] whose `distance` [N] is small beside their own spacing."""
-    if len(points) < 2:
+def _covered(places: Places, others: Places) -> float:
+    """The share of places at which others lie: so near, beside the places' own spacing, as to be the same."""
+    most = min(_MOST_COMPARED, max(1, _MOST_DISTANCES // max(len(places.points), len(others.points))))
+    some = thinned(places.index, most)
+    distance = torch.cdist(places.points[some], others.points).amin(1)
+    if len(places.points) < 2:
         return float((distance < 1).double().mean())
-    own = torch.cdist(points, points)
-    own.fill_diagonal_(torch.inf)
+    own = torch.cdist(places.points[some], places.points)
+    own[torch.arange(len(some)), some] = torch.inf
     return float((distance < _SAME_PLACE * own.amin(1)).double().mean())
 
 
-def _places(answer: Answer, *, size: Size, focal_mm: float) -> Tensor:
-    """The objects of an answer on the photo [N, 2] in pixels, each once."""
-    points, in_front = compile(answer.program).centers_px(size=size, focal_mm=focal_mm)
-    seen = points[in_front & in_frame(points, size)]
-    _, first = np.unique(np.round(seen.numpy(), 3), axis=0, return_index=True)
-    seen = seen[torch.from_numpy(np.sort(first))]
-    return seen[:: len(seen) // _MOST_COMPARED + 1]
+def places_of(answer: Answer, *, size: Size, focal_mm: float) -> Places:
+    """The objects of an answer on the photo, each once."""
+    pattern = compile(answer.program)
+    points, in_front = pattern.centers_px(size=size, focal_mm=focal_mm)
+    seen = in_front & in_frame(points, size)
+    points, index = points[seen], pattern.index[seen]
+    _, first = np.unique(np.round(points.numpy(), 3), axis=0, return_index=True)
+    once = torch.from_numpy(np.sort(first))
+    return Places(points[once], index[once])

@@ -63,25 +63,27 @@ def _noted(evidence: Evidence, first: Answer, other: Answer) -> Answer:
         a * b for a, b in zip(*(Camera.of(one.program).normal for one in (first, other)), strict=True)
     )
     turned = math.degrees(math.acos(max(-1.0, min(1.0, cosine)))) > _OTHER_PLANE_DEG
-    x, y = np.median(_centers(evidence, other), axis=0)
+    places = evidence.on_photo(torch.from_numpy(_centers(evidence, other)))
+    x, y = np.median(places.numpy(), axis=0)
     where = f"around ({x:.0f}, {y:.0f})"
     note = f"another plane carries a pattern, {where}" if turned else f"another pattern lies {where}"
     return dataclasses.replace(first, notes=(*first.notes, note))
 
 
 def _polygon(evidence: Evidence, answer: Answer) -> np.ndarray:
-    """The region of an answer, [M, 2] photo pixels."""
+    """The region of an answer, [M, 2] pixels of what was looked at."""
     focal_mm = answer.focal_mm or evidence.focal_mm
     return np.array(region_px(answer.program, evidence.image, focal_mm), np.float32).reshape(-1, 2)
 
 
 def _centers(evidence: Evidence, answer: Answer) -> np.ndarray:
+    """The objects of an answer, [N, 2] pixels of what was looked at."""
     focal_mm = answer.focal_mm or evidence.focal_mm
     return np.array(centers_px(answer.program, evidence.image, focal_mm)).reshape(-1, 4)[:, :2]
 
 
 def _cells_px(evidence: Evidence, pattern: Pattern, fit: Fit) -> np.ndarray:
-    """The middles of the cells of a fit's support, [N, 2] photo pixels."""
+    """The middles of the cells of a fit's support, [N, 2] pixels of what was looked at."""
     level = evidence.frame
     points, _ = sample_points(level, pattern, fit.theta, fit.index[fit.support])
     back = torch.linalg.inv(level.map_from_photo)

@@ -1,6 +1,7 @@
 """What the search looks at: a photo's features at several sizes and blurs, made when first asked for."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
@@ -84,16 +85,33 @@ class ColourMap:
     map_from_photo: Tensor
 
 
+def _itself(points_px: Tensor) -> Tensor:
+    return points_px
+
+
 @dataclass(slots=True)
 class Evidence:
-    """A photo as the search sees it. Holds the maps that were made so far, nothing else changes."""
+    """A photo as the search sees it. Holds the maps that were made so far, nothing else changes.
+
+    `on_photo` takes points [N, 2] in pixels of `image` to pixels of the photo as it is, where that is another
+    canvas (lens.py).
+    """
 
     image: Image
     config: SearchConfig
     focal_mm: float
+    on_photo: Callable[[Tensor], Tensor] = _itself
     _maps: dict[tuple[str, int], FeatureMap] = field(default_factory=dict)
     _levels: dict[tuple[str, int, float], Level] = field(default_factory=dict)
     _colours: dict[int, ColourMap] = field(default_factory=dict)
+
+    def under(self, focal_mm: float) -> "Evidence":
+        """The same photo under another focal (mm); what does not depend on it is shared, not made again."""
+        if focal_mm == self.focal_mm:
+            return self
+        return Evidence(
+            self.image, self.config, focal_mm, self.on_photo, _maps=self._maps, _colours=self._colours
+        )
 
     def features(self, longer: int, *, name: str | None = None) -> FeatureMap:
         """The photo's features with the longer side reduced to `longer` pixels (never enlarged).

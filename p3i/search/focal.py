@@ -29,6 +29,7 @@ from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.result import FOCAL_REASONS, FocalSource
+from p3i.search.thinned import thinned
 from p3i.size import Size
 from p3i.vision.warp import in_frame
 
@@ -286,7 +287,7 @@ def _covariance(pattern: Pattern, *, size: Size, focal_mm: float) -> Tensor | No
     index = pattern.index[seen]
     if len(index) < 4:
         return None
-    index = index[:: len(index) // _MOST_POINTS + 1]
+    index = index[thinned(index, _MOST_POINTS)]
 
     def pixels(theta: Tensor, at: Tensor = index) -> Tensor:
         matrix = pattern.image_from_plane(theta, size=size, focal_mm=focal_mm)

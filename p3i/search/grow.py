@@ -106,7 +106,7 @@ def follow(
     rounds: int,
     finest: bool = False,
 ) -> Fit | None:
-    """Find the instances around the `selected` cells, fit theta to them, take in the cells beyond; repeat."""
+    """Find the instances around cells `selected` [N, 2], fit theta [P] to them, take in more; repeat."""
     best: Fit | None = None
     previous: set[tuple[float, ...]] = set()
     for turn in range(rounds):
@@ -265,12 +265,12 @@ def _sample_of(count: int, generator: torch.Generator) -> Tensor:
 
 
 def side_of_cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:
-    """The side of the cell at the origin, in photo pixels."""
+    """The side of the cell at the origin under theta [P], in photo pixels."""
     return cell_px(evidence.frame, pattern, theta)
 
 
 def sane(pattern: Pattern, theta: Tensor) -> bool:
-    """Whether theta still means a lattice seen by a camera."""
+    """Whether theta [P] still means a lattice seen by a camera."""
     if not bool(torch.isfinite(theta).all()):
         return False
     lattice = Lattice.of(pattern, theta)

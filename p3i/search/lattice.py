@@ -99,7 +99,7 @@ def lattice_pattern() -> Pattern:
 
 
 def reduce_basis(basis: np.ndarray) -> np.ndarray:
-    """The shortest basis of the same lattice (Lagrange-Gauss), in one fixed order and orientation.
+    """The shortest basis [2, 2] of the same lattice (Lagrange-Gauss), in one fixed order and orientation.
 
     u is the more horizontal one and points right, v turns from u towards y (down): equal lattices get equal
     text.
@@ -213,7 +213,7 @@ def map_from_index(level: Level, pattern: Pattern, theta: Tensor) -> np.ndarray:
 
 
 def cell_px(level: Level, pattern: Pattern, theta: Tensor) -> float:
-    """The side of the cell at the origin in photo pixels: the square root of its area."""
+    """The side of the cell at the origin under theta [P], in photo pixels: the square root of its area."""
     area, _ = cell_areas(
         map_from_index(level, pattern, theta), torch.zeros((1, 2), dtype=torch.float64), level
     )

@@ -162,7 +162,7 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
     if session.config.strict:
         free, (layout, moved) = layout, strict_layout(layout)
         notes = (_strict_note(free, layout, moved * session.evidence.image.size.unit_px),)
-    measured = layout_fit(session.evidence, pattern, layout)
+    measured = layout_fit(session.evidence, layout)
     if measured is None:
         return None
     score = score_of(measured.contrast)

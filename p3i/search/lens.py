@@ -16,16 +16,17 @@ import torch
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import with_leaves
 from p3i.interp.camera import project
-from p3i.interp.compile import compile
 from p3i.interp.lens import photo_from_straight
-from p3i.interp.pattern import Pattern, moving_leaves
+from p3i.interp.pattern import moving_leaves
 from p3i.search.answer import Answer
 from p3i.search.config import MOST_K1
 from p3i.search.evidence import Evidence
-from p3i.search.patches import find_objects, frames, spacing
+from p3i.search.patches import Frames, find_objects, frames, spacing
 from p3i.search.refine import free_numbers
 from p3i.search.robust import robust_fit
 from p3i.search.session import Session
+from p3i.search.thinned import thinned
+from p3i.search.whole import whole_filling
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.warp import in_frame, pixel_grid, remapped
@@ -36,6 +37,8 @@ _WIDEST = 1.4
 _SHARE_NOISE, _PIXEL_NOISE = 0.03, 0.3
 # k1 before anything is known: none, give or take this.
 _PRIOR_SPREAD = 0.2
+# The logarithm of the focal, where the pattern was to tell it, is known to this; a step moves it by that.
+_FOCAL_SPREAD, _MOST_ZOOM = 0.35, 0.15
 # A lens is believed in where k1 is so many times its own uncertainty, and not too small to matter.
 _SIGMAS, _LEAST_K1 = 4.0, 0.015
 # Two estimates this close are one.
@@ -66,6 +69,11 @@ class Straightened:
         focal_mm = None if answer.focal_mm is None else answer.focal_mm * self.scale
         program = scaled(answer.program, self.scale)
         return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=self.k1)
+
+    def points_on_photo(self, points_px: torch.Tensor) -> torch.Tensor:
+        """Points [..., 2] in pixels of `image` as pixels of the photo as it was taken."""
+        shifted = _shifted(points_px, self.image.size, self.photo_size)
+        return photo_from_straight(shifted, self.k1, size=self.photo_size)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,16 +121,21 @@ def scaled(program: Program, factor: float) -> Program:
 def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit | None:
     """k1 from the objects of an answer that was found on `seen`; None where they are too few.
 
-    All numbers of the program and k1 are fitted together, to places on the photo as it was taken.
+    All numbers of the program, what it writes twice as one, and k1 are fitted together, to places on the
+    photo as it was taken.
     """
-    pattern = compile(answer.program)
+    whole = whole_filling(answer.program)
+    if whole is None:
+        return None
+    filling, numbers = whole
+    pattern, theta = filling.pattern, filling.theta(numbers)
     focal_mm = answer.focal_mm or evidence.focal_mm
     canvas = evidence.image.size
-    theta, index = pattern.theta, pattern.index.double()
-    matrix = pattern.image_from_plane(size=canvas, focal_mm=focal_mm)
-    points, in_front = project(matrix, pattern.points_at(index))
+    index = pattern.index.double()
+    matrix = pattern.image_from_plane(theta, size=canvas, focal_mm=focal_mm)
+    points, in_front = project(matrix, pattern.points_at(index, theta))
     index = index[in_front & in_frame(points, canvas)]
-    index = index[:: len(index) // _MOST_OBJECTS + 1]
+    index = index[thinned(index, _MOST_OBJECTS)]
     if len(index) < _FEWEST_OBJECTS:
         return None
     side = spacing(pattern, theta)
@@ -137,23 +150,29 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
     index, offsets, weights = index[weights > 0], found.offsets[weights > 0], weights[weights > 0].double()
     plane = frames(pattern, theta, index, side=side).points(offsets[:, None])[:, 0]
     straight, _ = project(matrix, plane)
-    targets, _ = photo_from_straight(
-        _shifted(straight, canvas, seen.photo_size), seen.k1, size=seen.photo_size
-    )
-    cell_px = _spacing_px(pattern, index, matrix, side)
+    targets = seen.points_on_photo(straight)
+    cell_px = _spacing_px(frames(pattern, theta, index, side=side), matrix)
     noise = (_PIXEL_NOISE**2 + (_SHARE_NOISE * cell_px) ** 2).sqrt()
-    free = free_numbers(pattern, theta)
+    # Where the pattern was to tell the focal, an egg may have been taken for a circle under a wrong one.
+    free_focal = answer.focal_mm is not None
+    limits = dict(zip(pattern.paths, free_numbers(pattern, theta).limits, strict=True))
+    steps = [*(limits[one.name] for one in filling.moving), *([_MOST_ZOOM] if free_focal else []), 0.05]
 
     def points_of(moving: torch.Tensor) -> torch.Tensor:
-        numbers = free.into(theta, moving[..., :-1])
-        at = pattern.image_from_plane(numbers, size=canvas, focal_mm=focal_mm)
-        straight, _ = project(at, pattern.points_at(index, numbers))
+        theta = filling.theta(moving[..., : len(numbers)])
+        at = pattern.image_from_plane(
+            theta, size=canvas, focal_mm=moving[..., -2].exp() if free_focal else focal_mm
+        )
+        straight, _ = project(at, pattern.points_at(index, theta))
         return photo_from_straight(
             _shifted(straight, canvas, seen.photo_size), moving[..., -1, None, None], size=seen.photo_size
         )[0]
 
-    start = torch.cat([free.of(theta), torch.tensor([seen.k1], dtype=torch.float64)])
+    more = [math.log(focal_mm), seen.k1] if free_focal else [seen.k1]
+    start = torch.cat([numbers, torch.tensor(more, dtype=torch.float64)])
     prior = torch.zeros(len(start), 2, dtype=torch.float64)
+    if free_focal:
+        prior[-2, 0], prior[-2, 1] = math.log(evidence.focal_mm), 1 / _FOCAL_SPREAD**2
     prior[-1, 1] = 1 / _PRIOR_SPREAD**2
     whiten = torch.eye(2, dtype=torch.float64) / noise[:, None, None]
     moved = robust_fit(
@@ -162,7 +181,7 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
         targets=targets,
         whiten=whiten,
         weights=weights,
-        limits=torch.tensor([*free.limits, 0.05], dtype=torch.float64),
+        limits=torch.tensor(steps, dtype=torch.float64),
         prior=prior,
         iterations=15,
     )
@@ -202,8 +221,10 @@ def find_with_lens(session: Session, search: Search) -> list[Answer]:
 
 def _searched(seen: Straightened, session: Session, search: Search) -> tuple[list[Answer], Evidence]:
     """The answers on a straightened photo, in units of its own canvas, and what was looked at."""
-    evidence = Evidence(seen.image, session.config, session.evidence.focal_mm / seen.scale)
+    focal_mm = session.evidence.focal_mm / seen.scale
+    evidence = Evidence(seen.image, session.config, focal_mm, seen.points_on_photo)
     again = dataclasses.replace(session, evidence=evidence)
+    again.rings = None  # those were of the photo as it is
     found = search(again)
     session.stopped = again.stopped
     return found, evidence
@@ -214,9 +235,8 @@ def _shifted(points_px: torch.Tensor, canvas: Size, photo: Size) -> torch.Tensor
     return points_px - points_px.new_tensor(canvas.middle) + points_px.new_tensor(photo.middle)
 
 
-def _spacing_px(pattern: Pattern, index: torch.Tensor, matrix: torch.Tensor, side: float) -> torch.Tensor:
+def _spacing_px(where: Frames, matrix: torch.Tensor) -> torch.Tensor:
     """The spacing about each object in pixels [N]: the root of the area that its patch covers."""
-    where = frames(pattern, pattern.theta, index, side=side)
     corners = [project(matrix, where.origin + 0.1 * axis)[0] for axis in (where.along, where.across)]
     middle, _ = project(matrix, where.origin)
     a, b = ((corner - middle) / 0.1 for corner in corners)

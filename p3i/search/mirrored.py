@@ -7,20 +7,20 @@ Whether the objects of an answer tell is asked of the answer itself: its mirror 
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.curves import CurveFit, measured, registered
 from p3i.search.evidence import Evidence
-from p3i.search.fill import Filling, fillings, start_values, unknowns_of, whole_program_sketch
+from p3i.search.fill import Filling
 from p3i.search.rings import numbers_of, values_of
+from p3i.search.whole import whole_filling
 from p3i.size import Size
 
 Array = NDArray[np.float64]
@@ -34,8 +34,6 @@ _TELLS = 6.0
 _AS_ALIKE = 0.9
 _LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
 _ROUNDS = 2
-# A step of the angle whose multiple comes back to within so much closes a ring, and stays.
-_CLOSED_DEG = 1e-6
 # Of more objects no tilt is in doubt.
 _MOST_OBJECTS = 1000
 
@@ -53,13 +51,16 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
 
     None for a program whose draws do not go round a circle, and where the objects tell the two poses apart.
     """
-    filling = _filling(answer.program)
-    if filling is None:
+    values = leaves(answer.program)
+    if values.get("draw.x.angle.j", 0.0) == 0.0 or "draw.y.angle.j" not in values:
         return None
+    whole = whole_filling(answer.program)
+    if whole is None or len(whole[0].pattern.index) > _MOST_OBJECTS:
+        return None
+    filling, as_written = whole
     focal_mm = answer.focal_mm or evidence.focal_mm
     camera = Camera.of(answer.program, focal_mm=focal_mm)
-    as_written = start_values(filling)
-    own = None if as_written is None else _fit(evidence, filling, as_written, focal_mm)
+    own = _fit(evidence, filling, as_written, focal_mm)
     if own is None:
         return None
     start = _mirror_image(own, camera, evidence.image.size)
@@ -90,19 +91,6 @@ def _fit(evidence: Evidence, filling: Filling, z: torch.Tensor, focal_mm: float)
     for _ in range(_ROUNDS):
         fit = None if fit is None else registered(evidence, fit, keep_side=True)
     return fit
-
-
-def _filling(program: Program) -> Filling | None:
-    """The program with camera and draws free, but for the step of a closed ring; None for straight rows."""
-    values = leaves(program)
-    step = values.get("draw.x.angle.j", 0.0)
-    if step == 0.0 or "draw.y.angle.j" not in values:
-        return None
-    sketch = whole_program_sketch(program)
-    if abs(round(360 / step) * step - 360) < _CLOSED_DEG:
-        free = tuple(hole for hole in sketch.holes if not hole.path.endswith(".angle.j"))
-        sketch = replace(sketch, holes=free)
-    return next(fillings(sketch, unknowns_of(sketch), most_indices=_MOST_OBJECTS, most_settings=1), None)
 
 
 def _mirror_image(fit: CurveFit, camera: Camera, size: Size) -> torch.Tensor | None:

@@ -9,16 +9,19 @@ from torch import Tensor
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
+from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import sample_points
 from p3i.search.correlate import find_instances
 from p3i.search.evidence import Evidence, Level
 from p3i.search.extent import find_extent
 from p3i.search.grow import Fit, sane, side_of_cell, weighed
+from p3i.search.judged import judged_cells
 from p3i.search.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.phase import find_phase
 from p3i.search.robust import fit_instances
-from p3i.search.score import MOST_JUDGED, judged_contrast, judging_features, score_of
+from p3i.search.score import score_of
+from p3i.search.thinned import thinned
 from p3i.vision.warp import in_frame
 
 # Numbers in a program: angles to a thousandth of a degree, lengths to a ten-thousandth of a unit, which is
@@ -137,25 +140,18 @@ def strict_layout(layout: Layout) -> tuple[Layout, float]:
     return Layout(lattice, i_range, j_range, kept), float(np.hypot(*moved))
 
 
-def layout_fit(evidence: Evidence, pattern: Pattern, layout: Layout) -> Fit | None:
+def layout_fit(evidence: Evidence, layout: Layout) -> Fit | None:
     """How well the cells that a layout draws predict each other; None for fewer than four in view.
 
     In the search's features, or in these with the colours, whichever shows more: a chequered floor's cell is
     told from half of it by colour only, and the stones on a board differ in colour only.
     """
-    theta = layout.lattice.theta(pattern)
-    side = side_of_middle(evidence, pattern, layout)
-    levels = (evidence.level_for(side, name=name) for name in judging_features(evidence.config))
-    fits = [_measured(level, pattern, layout, theta) for level in levels]
-    return max((fit for fit in fits if fit is not None), key=lambda fit: score_of(fit.contrast), default=None)
-
-
-def _measured(level: Level, pattern: Pattern, layout: Layout, theta: Tensor) -> Fit | None:
-    index = _drawn_cells(level, pattern, layout, theta)
-    if len(index) < 4:
+    drawn = compile(layout.program())
+    found = [one for one in judged_cells(evidence, drawn) if one.whole]
+    if not found:
         return None
-    index = index[:: len(index) // MOST_JUDGED + 1]
-    return weighed(level, pattern, theta, index, judged_contrast(level, pattern, theta, index))
+    best = max(found, key=lambda one: score_of(one.contrast))
+    return weighed(best.level, drawn, drawn.theta, best.index, best.contrast)
 
 
 def _drawn_cells(
@@ -178,7 +174,7 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     index = _drawn_cells(level, pattern, layout, theta, cut=True)
     if len(index) < _FEWEST_REFITTED:
         return layout
-    index = index[:: len(index) // _MOST_REFITTED + 1]
+    index = index[thinned(index, _MOST_REFITTED)]
     weights = torch.ones(len(index))
     for _ in range(_REFITS):
         found = find_instances(level, pattern, theta, index, weights, side=_SIDE)

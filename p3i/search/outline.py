@@ -39,7 +39,7 @@ class Outline:
     gain: float
 
     def holds(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which of the cells (i, j) lie inside."""
+        """Which of the cells i [N], j [N] lie inside, [N]; the two broadcast."""
         inside = (
             (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
         )
@@ -49,7 +49,7 @@ class Outline:
 
 
 def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outline | None:
-    """The outline of the greatest gain; None where no cell has evidence for it."""
+    """The outline of the greatest gain over `evidence` [I, J]; None where no cell has evidence for it."""
     if not (evidence > 0).any():
         return None
     worth = evidence - _IDLE
@@ -78,7 +78,7 @@ def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outl
 
 
 def rectangle_gain(evidence: Array) -> float:
-    """The greatest sum of evidence over a rectangle of cells, 0 for none."""
+    """The greatest sum of `evidence` [I, J] over a rectangle of cells, 0 for none."""
     i0, i1, j0, j1 = _best_rectangle(evidence)
     return max(0.0, float(evidence[j0:j1, i0:i1].sum()))
 

@@ -18,7 +18,7 @@ from p3i.search.answer import Answer
 from p3i.search.evidence import COARSE, Evidence
 from p3i.search.lattice import Lattice, lattice_pattern
 from p3i.search.objects import Layout, filling_layout
-from p3i.search.score import normalised_score
+from p3i.search.score import score_of_program
 from p3i.search.session import Session
 from p3i.vision.features import FeatureMap
 from p3i.vision.warp import in_frame, sample, sample_valid
@@ -158,4 +158,4 @@ def _answer(evidence: Evidence, numbers: Tensor, *, loss: float) -> Answer | Non
     seen = evidence.in_sight(pattern)
     if not math.isfinite(loss) or int(seen.sum()) < 4:
         return None
-    return Answer(program, "lattice", normalised_score(evidence, pattern, seen), 1 / (1 + loss))
+    return Answer(program, "lattice", score_of_program(evidence, program), 1 / (1 + loss))

@@ -21,6 +21,7 @@ from p3i.interp.pattern import Pattern
 from p3i.search.cells import HALF_STEPS, Cells, Contrast, contrast_of
 from p3i.search.correlate import Instances, correlate, mean_of_others
 from p3i.search.evidence import ColourMap, Evidence
+from p3i.search.thinned import thinned
 from p3i.vision.warp import sample, sample_valid
 
 SIDE = 14
@@ -30,7 +31,12 @@ REACH = 5
 # Loop indices this far apart give the direction of the curve.
 _TANGENT_STEP = 0.02
 # More draws than this are not needed to say how far apart draws are.
-_MOST_MEASURED = 400
+_MOST_MEASURED, _FEWEST_MEASURED = 400, 20
+# ... each against all others, so many distances at most.
+_MOST_DISTANCES = 2_000_000
+# An object's place is known to this share of a patch's side, and no better than this many pixels.
+_SHARE_NOISE = 0.03
+_PIXEL_NOISE = 0.3
 # Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
 _FLOOR = 0.4
 
@@ -62,14 +68,13 @@ class Patches:
 
 
 def spacing(pattern: Pattern, theta: Tensor) -> float:
-    """The median distance of a draw to its nearest neighbour, in program units; 1 for a single draw.
+    """The median distance of a draw under theta [P] to its nearest, in program units; 1 for a single draw.
 
     Draws that coincide count once.
     """
     centers = pattern.centers(theta)
-    centers = centers[:: len(centers) // _MOST_MEASURED + 1] if len(centers) > 2000 else centers
-    few = centers[:: len(centers) // _MOST_MEASURED + 1]
-    distance = torch.cdist(few, centers)
+    most = max(_FEWEST_MEASURED, min(_MOST_MEASURED, _MOST_DISTANCES // max(len(centers), 1)))
+    distance = torch.cdist(centers[thinned(pattern.index, most)], centers)
     distance = torch.where(distance > 1e-6, distance, torch.inf).amin(1)
     finite = distance[torch.isfinite(distance)]
     return float(finite.median()) if len(finite) else 1.0
@@ -113,7 +118,7 @@ def offsets_grid(count: int, *, samples_a_side: int = SIDE) -> Tensor:
 
 
 def sample_px(matrix: Tensor, where: Frames, *, side: int = SIDE) -> float:
-    """The median distance of a patch's samples in photo pixels; `matrix` takes program units to pixels."""
+    """The median distance of patches' samples in photo pixels; `matrix` [3, 3] takes units to these."""
     lengths = []
     middle, front = project(matrix, where.origin)
     for axis in (where.along, where.across):
@@ -214,3 +219,25 @@ def find_objects(
     offsets, peak, lead = correlate(patches.values, known, templates)
     # Rows of a patch run across the curve, columns along it.
     return Instances(index, offsets.flip(1) / SIDE, peak, lead)
+
+
+def whitening(matrix: Tensor, where: Frames) -> Tensor:
+    """[N, 2, 2]: differences in pixels to differences in units of places' noise, along and across."""
+    columns = []
+    for axis in (where.along, where.across):
+        ahead, _ = project(matrix, where.origin + 0.1 * axis)
+        behind, _ = project(matrix, where.origin - 0.1 * axis)
+        columns.append((ahead - behind) / 0.2)
+    px_from_side = torch.stack(columns, 2)
+    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
+    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
+    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
+
+
+def misfit(difference: Tensor, *, whiten: Tensor, certainty: Tensor) -> float:
+    """How far objects lie from their places: a robust mean, 0 where all are there.
+
+    Shapes: difference [N, 2] in pixels; whiten [N, 2, 2], of `whitening`; certainty [N], not all 0.
+    """
+    residual = torch.einsum("nij,nj->ni", whiten, difference)
+    return float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())

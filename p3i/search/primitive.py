@@ -26,6 +26,7 @@ from p3i.search.cells import (
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit, side_of_cell
 from p3i.search.lattice import Lattice, reduce_basis
+from p3i.search.thinned import thinned
 
 # Rows: u and v of a sublattice in units of the lattice's. All sublattices of index 2 and 3, and the double.
 _DOUBLES = ([[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]])
@@ -47,8 +48,8 @@ _ALIKE = 0.3
 _LEAST_AGREEMENT = 0.2
 # A finer lattice must keep this share of the contrast against half steps (DESIGN.md, 4.5).
 _NEARLY_AS_GOOD = 0.5
-# This many cells are enough to tell one lattice from another.
-_MOST_CELLS = 100
+# This many cells, of one coset or of all, are enough to tell one lattice from another.
+_MOST_CELLS = 200
 _FEWEST = 4
 
 
@@ -143,14 +144,13 @@ def _likeness(
     kinds = np.unique(coset)
     if len(kinds) < 2 or min(int((coset == kind).sum()) for kind in kinds) < 3:
         return 1.0
-    every = max(1, len(coset) // (_MOST_CELLS * len(kinds)))
     side = side_of_cell(evidence, pattern, ground.theta)
     least = 1.0
     for name in (None, "rgb"):
         level = evidence.level_for(side, name=name)
         groups = [
-            read_cells(level, pattern, ground.theta, ground.index[coset == kind][::every], sample_grid())
-            for kind in kinds
+            read_cells(level, pattern, ground.theta, cells[thinned(cells, _MOST_CELLS)], sample_grid())
+            for cells in (ground.index[coset == kind] for kind in kinds)
         ]
         ones = [torch.ones(len(group.values)) for group in groups]
         own = float(
@@ -179,7 +179,7 @@ def _agreement_of_all(groups: list[Cells]) -> float:
 
 def _contrast(evidence: Evidence, pattern: Pattern, ground: _Ground) -> float:
     """The mean contrast of the cells against half steps."""
-    some = ground.index[:: max(1, len(ground.index) // _MOST_CELLS)]
+    some = ground.index[thinned(ground.index, _MOST_CELLS)]
     level = evidence.level_for(side_of_cell(evidence, pattern, ground.theta))
     weights = torch.ones(len(some))
     found = contrast(level, pattern, ground.theta, some, weights=weights, grid=sample_grid())

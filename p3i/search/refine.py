@@ -46,7 +46,7 @@ class FreeNumbers:
 
 
 def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> FreeNumbers:
-    """All numbers but the fixed ones, each with the most that one step may move it.
+    """All numbers of theta [P] but the fixed ones, each with the most that one step may move it.
 
     Zeros that scale a loop variable are free too: the limit comes from the largest number of their kind.
     """

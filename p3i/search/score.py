@@ -1,5 +1,11 @@
-"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score."""
+"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score.
 
+The score is a function of photo and finished program (with the focal and the lens of its header) alone: what
+`synth` prints of its answers and what `p3i score` says. What each family knew besides while it searched only
+decides what it goes on with, and may refuse an answer that this score would let pass.
+"""
+
+import math
 from dataclasses import dataclass
 
 import torch
@@ -10,23 +16,21 @@ from p3i.interp.camera import project
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import distinct, edges
-from p3i.search.cells import HALF_STEPS, contrast, sample_grid
 from p3i.search.config import SearchConfig
-from p3i.search.evidence import FINE, Evidence, Level
+from p3i.search.evidence import FINE, Evidence
+from p3i.search.judged import judged_cells, judged_patches, sweeps_cells
 from p3i.search.lens import scaled, straightened
-from p3i.search.patches import half_steps, patch_contrast, spacing
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
 
-MOST_JUDGED = 600
-"""More cells than this are not needed to judge a program."""
-_ROUNDS = 4
 # What so many cells explain, chance explains too; on a curve fewer, as there are fewer curves to choose from.
 _FEW = 6
 _FEW_ON_CURVE = 3
 # So much agreement is found on some curve of every photo.
 _CHANCE_OF_CURVE = 0.1
+# A misfit of the objects' places beyond this one counts like it.
+_WORST_MISFIT = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +40,8 @@ class Evaluation:
     `equation2`: the paper's loss, the sum over `edges` neighbouring pairs of draws, both in sight, of the
     squared difference of their features. `normalised`: the mean over the objects in sight of how much better
     the others predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
-    perfect. It is what `synth` prints as score. `objects`: how many are in sight.
+    perfect. `synth` prints the same for its answers, from the finished program. `objects`: how many are in
+    sight.
     """
 
     equation2: float
@@ -61,57 +66,53 @@ def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluati
     given = None if config.focal_mm == "auto" else config.focal_mm
     focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
     k1 = program.header.lens_k1 if program.header is not None else None
-    if k1:  # judged as it was found: on the photo freed of its lens
-        free = straightened(image, k1)
-        image, program, focal_mm = free.image, scaled(program, 1 / free.scale), focal_mm / free.scale
-    evidence = Evidence(image, config, focal_mm)
+    evidence, program = _without_lens(Evidence(image, config, focal_mm), program, k1)
     pattern = without_doubles(compile(program))
-    points, in_front = pattern.centers_px(size=image.size, focal_mm=focal_mm)
-    seen = in_front & in_frame(points, image.size)
+    points, in_front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
+    seen = in_front & in_frame(points, evidence.image.size)
     if int(seen.sum()) < 2:
         raise ProgramError(f"{int(seen.sum())} of the program's objects lie in the photo; a score needs two")
     loss, pairs = _equation2(evidence, pattern, points, seen)
-    return Evaluation(loss, pairs, normalised_score(evidence, pattern, seen), int(seen.sum()))
+    return Evaluation(loss, pairs, normalised_score(evidence, pattern), int(seen.sum()))
 
 
-def normalised_score(evidence: Evidence, pattern: Pattern, seen: torch.Tensor) -> float:
-    """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`."""
-    index = pattern.index[seen].double()
-    index = index[:: len(index) // MOST_JUDGED + 1]
-    steps = half_steps(pattern)
-    if len(steps) < len(HALF_STEPS):  # one loop sweeps no cells: patches about the draws are compared
-        side = spacing(pattern, pattern.theta)
-        mm = evidence.focal_mm
-        found = patch_contrast(evidence, pattern, pattern.theta, index, side=side, focal_mm=mm)
-        return score_of_curve(mean_contrast(found.contrast), len(index))
-    side = _cell_px(evidence, pattern, index)
-    return max(
-        score_of(judged_contrast(level, pattern, pattern.theta, index, half_steps=steps))
-        for level in (evidence.level_for(side, name=name) for name in judging_features(evidence.config))
-    )
+def score_of_program(
+    evidence: Evidence, program: Program, *, focal_mm: float | None = None, lens_k1: float | None = None
+) -> float:
+    """The normalised score of a program as `evaluate` gives it, on a photo that is being looked at already.
+
+    `focal_mm` is the program's own, None for the one that `evidence` assumes; `lens_k1` as in its header. 0
+    where fewer than two objects lie in the photo.
+    """
+    evidence = evidence if focal_mm is None else evidence.under(focal_mm)
+    evidence, program = _without_lens(evidence, program, lens_k1)
+    pattern = without_doubles(compile(program))
+    return normalised_score(evidence, pattern) if int(evidence.in_sight(pattern).sum()) >= 2 else 0.0
 
 
-def judging_features(config: SearchConfig) -> tuple[str, ...]:
-    """The features that programs are judged by, each alone: the search's, and these with the colours."""
-    names = config.features_used
-    return (names,) if "rgb" in names.split("+") else (names, names + "+rgb")
+def _without_lens(evidence: Evidence, program: Program, k1: float | None) -> tuple[Evidence, Program]:
+    """A program is judged as it was found: on the photo freed of its lens, in units of that canvas."""
+    if not k1:
+        return evidence, program
+    free = straightened(evidence.image, k1)
+    looked_at = Evidence(free.image, evidence.config, evidence.focal_mm / free.scale, free.points_on_photo)
+    return looked_at, scaled(program, 1 / free.scale)
 
 
-def judged_contrast(
-    level: Level,
-    pattern: Pattern,
-    theta: torch.Tensor,
-    index: torch.Tensor,
-    *,
-    half_steps: torch.Tensor = HALF_STEPS,
-) -> torch.Tensor:
-    """The contrast [N] of the cells `index` [N, 2] of a program that is judged: all count alike at first."""
-    weights = torch.ones(len(index))
-    grid = sample_grid()
-    found = contrast(
-        level, pattern, theta, index, weights=weights, grid=grid, half_steps=half_steps, rounds=_ROUNDS
-    )
-    return found.contrast
+def normalised_score(evidence: Evidence, pattern: Pattern) -> float:
+    """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`.
+
+    `pattern` draws no point twice. Cells are judged in the features that show most; curves and single rows at
+    the place of their sector that shows most.
+    """
+    if sweeps_cells(pattern):
+        return max((score_of(found.contrast) for found in judged_cells(evidence, pattern)), default=0.0)
+    best = 0.0
+    for found in judged_patches(evidence, pattern):
+        mean, count = mean_contrast(found.contrast), len(found.contrast)
+        if score_of_curve(mean, count) > best:
+            best = max(best, score_of_curve(placed_right(mean, found.misfit()), count))
+    return best
 
 
 def score_of(contrast: torch.Tensor) -> float:
@@ -143,6 +144,11 @@ def mean_contrast(contrast: torch.Tensor) -> float:
     return float((contrast.clamp(min=0) + 0.5 * contrast.clamp(max=0)).mean())
 
 
+def placed_right(mean: float, misfit: float) -> float:
+    """A mean contrast, less where the objects do not stand where the program draws (`patches.misfit`)."""
+    return mean * math.exp(-min(misfit, _WORST_MISFIT))
+
+
 def _equation2(
     evidence: Evidence, pattern: Pattern, points: torch.Tensor, seen: torch.Tensor
 ) -> tuple[float, int]:
@@ -170,17 +176,3 @@ def without_doubles(pattern: Pattern) -> Pattern:
         pattern.index[kept],
         torch.tensor(edges(live), dtype=torch.int64).reshape(-1, 2),
     )
-
-
-def _cell_px(evidence: Evidence, pattern: Pattern, index: torch.Tensor) -> float:
-    """A typical distance of neighbours, in photo pixels: the size of what is compared."""
-    level = evidence.frame
-    matrix = level.map_from_plane(pattern, pattern.theta)
-    here, front = project(matrix, pattern.points_at(index))
-    steps = []
-    for step in half_steps(pattern)[:2]:
-        there, ahead = project(matrix, pattern.points_at(index + 2 * step))
-        steps.append((there - here).norm(dim=1)[front & ahead])
-    lengths = torch.cat(steps)
-    typical = float(lengths.median()) if len(lengths) else 20.0
-    return max(typical, 2.0) / float(level.map_from_photo[0, 0])

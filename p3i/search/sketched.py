@@ -31,7 +31,7 @@ from p3i.search.fill import (
 )
 from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
-from p3i.search.score import normalised_score
+from p3i.search.score import score_of_program
 from p3i.search.session import Session
 from p3i.search.settings import best_setting, widened
 from p3i.search.thinned import thinned
@@ -287,12 +287,9 @@ def _answer(session: Session, fit: _Fit) -> Answer:
 
 def program_score(session: Session, program: Program) -> float:
     """The normalised score of a program, as `p3i score` gives it; 0 where too little of it is in sight."""
-    evidence = session.evidence
-    pattern = compile(program)
-    seen = evidence.in_sight(pattern)
-    if int(seen.sum()) < 4:
+    if int(session.evidence.in_sight(compile(program)).sum()) < 4:
         return 0.0
-    return normalised_score(evidence, pattern, seen)
+    return score_of_program(session.evidence, program)
 
 
 def structure_of(program: Program) -> StructureFound:

@@ -26,6 +26,7 @@ from p3i.search.result import (
     StopReason,
     SynthesisResult,
 )
+from p3i.search.score import score_of_program
 from p3i.search.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.search.table1 import unwritable_note, within_table1
@@ -84,11 +85,18 @@ def _result(
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(session, answers)
-    sure = [answer for answer in answers if answer.score >= needed]
+    told = [_with_printed_score(session, answer, needed) for answer in answers]
+    # A program that fills the picture is as sure as the part of it that was found, whatever lies beyond.
+    fills = config.extent == "image"
+    sure = [
+        after
+        for before, after in zip(answers, told, strict=True)
+        if before.score >= needed and (fills or after.score >= needed)
+    ]
     # What a person asked for is theirs to choose, whatever it costs.
     good = sure if asked_for(config) is not None else [answer for answer in sure if answer.worth > 0]
     if not good:
-        best = max((answer.score for answer in answers), default=0.0)
+        best = max((answer.score for answer in told), default=0.0)
         reason = StopReason.COSTS_MORE if sure else why_not(config)
         if session.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
@@ -196,6 +204,20 @@ def _in_text(trace: Trace) -> Trace:
         trace({**step, "program": text} if "program" in step else step)
 
     return told
+
+
+def _with_printed_score(session: Session, answer: Answer, needed: float) -> Answer:
+    """An answer with the score of its finished program, which is what `p3i score` says of it.
+
+    While it was fitted, its family knew more than a program holds (other radii of a ring, numbers before they
+    were rounded); what that found not sure enough is none the surer.
+    """
+    if answer.score < needed:
+        return answer
+    score = score_of_program(
+        session.evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1
+    )
+    return replace(answer, score=score)
 
 
 def _mirrored(session: Session, answer: Answer) -> Camera | None:

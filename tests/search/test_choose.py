@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 import torch
+from columns import two_kinds_of_columns
 from drawn import DrawnRing
 
 from p3i.evaluation.hybrid_scenes import hybrid_scene
@@ -150,3 +151,12 @@ def test_what_is_no_answer_stands_in_no_other_ones_way() -> None:
     poor = replace(answer(ring(cx=4.5)), score=NEEDED / 2)
     first, second = by_explained(EVIDENCE, [[poor, answer(ring())]], needed=NEEDED)
     assert first.program == ring() and first.worth > second.worth > 0
+
+
+def test_what_two_kinds_of_columns_explain_does_not_depend_on_their_number() -> None:
+    each: list[float] = []
+    for rows, columns in ((16, 16), (18, 18), (17, 22)):
+        image, lattice = two_kinds_of_columns(rows, columns)
+        found = explained(Evidence(image, SearchConfig(), 35.0), answer(lattice))
+        each.append(float(found.each.mean()))
+    assert each[1:] == pytest.approx([each[0]] * 2, rel=0.1)

@@ -6,7 +6,7 @@ import pytest
 import torch
 from drawn import DrawnRing, tilt_error_deg
 
-from p3i.search.curves import FOCALS_MM, CurveFit, curve_score, follow, measured
+from p3i.search.curves import FOCALS_MM, CurveFit, curve_score, follow, measured, registered
 from p3i.search.rings import ring_filling
 
 RING = DrawnRing()
@@ -57,6 +57,31 @@ def test_a_free_focal_is_found_and_a_stated_one_stays(focal_mm: float) -> None:
     assert free.focal_mm == pytest.approx(focal_mm, rel=0.05)
     assert error_deg(free, ring) < 0.5 < error_deg(stated, ring)
     assert free.quality > stated.quality
+
+
+def test_a_focal_at_its_bound_has_the_numbers_that_belong_to_it() -> None:
+    ring = DrawnRing(focal_mm=130.0, rx_deg=-42.0, radius=24.0)
+    evidence = ring.evidence()
+    stated = follow(evidence, started(ring), rounds=4)
+    bounded = registered(evidence, stated, free_focal=True)
+    while bounded is not None and bounded.focal_mm < FOCALS_MM[1]:
+        bounded = registered(evidence, bounded, free_focal=True)
+    assert bounded is not None and bounded.focal_mm == FOCALS_MM[1]
+    again = registered(evidence, bounded)
+    assert again is not None and again.focal_mm == FOCALS_MM[1]
+    assert error_deg(again, ring) == pytest.approx(error_deg(bounded, ring), abs=0.1)
+    torch.testing.assert_close(again.z, bounded.z, atol=0.3, rtol=0)
+
+
+def test_a_fit_that_holds_the_focal_holds_the_one_that_it_has() -> None:
+    """Not the one assumed for the photo: the numbers would belong to that."""
+    ring = DrawnRing(focal_mm=50.0, rx_deg=-42.0, radius=30.0)
+    filling = ring.filling()
+    true = measured(ring.evidence(), filling, ring.numbers(filling), focal_mm=50.0)
+    assert true is not None
+    held = registered(ring.evidence(), true)
+    assert held is not None and held.focal_mm == 50.0
+    torch.testing.assert_close(held.z, true.z, atol=0.2, rtol=0)
 
 
 def test_seen_straight_on_the_prior_holds_the_focal() -> None:

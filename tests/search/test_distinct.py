@@ -82,3 +82,11 @@ def test_a_program_told_with_another_focal_is_the_same() -> None:
 def test_programs_that_draw_nothing_in_sight_all_mean_the_same() -> None:
     away = lattice((9, 1), (-1, 9), shift=4000)
     assert kept(away, SQUARE, away) == [0, 1]
+
+
+def test_thousands_of_objects_are_one_candidate_in_any_order_of_the_loops() -> None:
+    rows, columns = (
+        lattice(*steps, count=60) for steps in (((0.9, 0.1), (-0.1, 0.9)), ((-0.1, 0.9), (0.9, 0.1)))
+    )
+    assert kept(rows, columns) == [0]
+    assert kept(rows, lattice((1.8, 0.2), (-0.1, 0.9), count=60)) == [0, 1]

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from drawn import DrawnRing
 from truth import SMALL, pose_error_deg, small_scene
 
 from p3i.grammar.ast import Program
@@ -24,19 +25,18 @@ SEED = 15
 """A scene with many objects."""
 
 
-def bent(seed: int, k1: float) -> Image:
-    """The scene as a lens of k1 shows it."""
-    at = straight_from_photo(pixel_grid(SMALL), k1, size=SMALL).numpy()
+def bent(image: Image, k1: float) -> Image:
+    """A pinhole camera's picture as a lens of k1 shows it."""
+    at = straight_from_photo(pixel_grid(image.size), k1, size=image.size).numpy()
     pixels = cv2.remap(
-        small_scene(seed).pixels, at[..., 0].copy(), at[..., 1].copy(), cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REFLECT,
-    )  # fmt: skip
-    return Image(pixels.astype(np.float32) / 255, np.ones(pixels.shape[:2], bool))
+        image.pixels, at[..., 0].copy(), at[..., 1].copy(), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT
+    )
+    return Image(pixels, np.ones(pixels.shape[:2], bool))
 
 
 @cache
 def answer(k1: float, lens: float | str | None) -> SynthesisResult:
-    return synthesize(bent(SEED, k1), SearchConfig(structure="lattice", lens=lens))  # pyright: ignore
+    return synthesize(bent(small_scene(SEED).image(), k1), SearchConfig(structure="lattice", lens=lens))  # pyright: ignore
 
 
 def far_off(result: SynthesisResult, k1: float) -> np.ndarray:
@@ -46,7 +46,7 @@ def far_off(result: SynthesisResult, k1: float) -> np.ndarray:
     return np.linalg.norm(found[:, None] - objects[shown].numpy()[None], axis=2).min(1)
 
 
-@pytest.mark.parametrize("k1", [-0.2, 0.15])
+@pytest.mark.parametrize("k1", [-0.3, -0.2, 0.15])
 def test_a_lens_is_estimated_from_the_pattern(k1: float) -> None:
     result, blind = answer(k1, "auto"), answer(k1, None)
     assert result.program is not None and blind.program is not None
@@ -56,6 +56,27 @@ def test_a_lens_is_estimated_from_the_pattern(k1: float) -> None:
     assert pose_error_deg(result.program, truth) < min(1.0, pose_error_deg(blind.program, truth))
     assert any("k1" in note for note in result.notes)
     assert np.median(far_off(result, k1)) < 2.0
+
+
+RING = DrawnRing(count=20, slots=20, center=(12.0, 2.0), radius=30.0, size=7.0, rx_deg=0.0, ry_deg=25.0)
+"""A ring that reaches into a corner, where a lens makes an egg of it."""
+
+
+def test_a_lens_is_estimated_from_a_ring() -> None:
+    config = SearchConfig(structure="circular", focal_mm=35.0, lens="auto")
+    result = synthesize(bent(RING.image(), -0.3), config)
+    assert result.lens_k1 == pytest.approx(-0.3, abs=0.02)
+    assert result.program is not None
+    camera = result.program.camera
+    assert (camera.rx_deg, camera.ry_deg) == pytest.approx((RING.rx_deg, RING.ry_deg), abs=0.5)
+    found = leaves(result.program)
+    assert found["draw.x.radius.1"] == found["draw.y.radius.1"] == pytest.approx(RING.radius, rel=0.1)
+    assert found["draw.x.offset.1"] == pytest.approx(RING.center[0], abs=0.3)
+
+
+def test_a_ring_tells_no_lens_where_there_is_none() -> None:
+    result = synthesize(RING.image(), SearchConfig(structure="circular", focal_mm=35.0, lens="auto"))
+    assert result.program is not None and result.lens_k1 is None
 
 
 def test_a_lens_that_is_known_is_taken_as_it_is() -> None:
@@ -72,7 +93,7 @@ def test_where_no_lens_shows_the_answer_is_the_one_without() -> None:
 
 
 def test_a_straightened_photo_shows_all_of_a_barrel_and_keeps_the_middle() -> None:
-    image = bent(SEED, 0.0)
+    image = bent(small_scene(SEED).image(), 0.0)
     free = straightened(image, -0.2)
     assert free.image.size.width > SMALL.width and free.scale > 1
     assert free.scale == free.image.size.longer / SMALL.longer

@@ -149,16 +149,16 @@ def test_the_layout_of_the_truth_is_the_truth(seed: int) -> None:
 
 def test_the_true_layout_explains_the_photo_and_a_shifted_basis_does_not() -> None:
     scene, layout = small_scene(14), true_layout(14)
-    true_fit = layout_fit(evidence_of(scene), PATTERN, layout)
+    true_fit = layout_fit(evidence_of(scene), layout)
     wrong = layout.lattice.with_basis(layout.lattice.basis * 1.3)
-    wrong_fit = layout_fit(evidence_of(scene), PATTERN, Layout(wrong, layout.i_range, layout.j_range))
+    wrong_fit = layout_fit(evidence_of(scene), Layout(wrong, layout.i_range, layout.j_range))
     assert true_fit is not None and float(true_fit.contrast.mean()) > 0.5
     assert wrong_fit is None or wrong_fit.score < 0.1 * true_fit.score
 
 
 def test_fewer_than_four_objects_are_no_pattern() -> None:
     layout = Layout(true_layout(14).lattice, (0, 3), (0, 1))
-    assert layout_fit(evidence_of(small_scene(14)), PATTERN, layout) is None
+    assert layout_fit(evidence_of(small_scene(14)), layout) is None
 
 
 def test_the_last_fit_moves_a_layout_back_onto_its_objects() -> None:

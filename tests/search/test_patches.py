@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from drawn import DrawnRing
 
+from p3i.grammar.ast import Program
 from p3i.grammar.parser import parse
 from p3i.interp.compile import compile
 from p3i.search.cells import agreement
@@ -93,6 +94,13 @@ def test_objects_that_were_moved_are_found_where_they_are() -> None:
 
 def test_the_spacing_is_that_of_neighbours() -> None:
     assert math.isclose(SIDE, 2 * RING.radius * math.sin(math.pi / 12), rel_tol=1e-9)
+
+
+def test_the_spacing_of_thousands_of_draws_is_that_of_neighbours_too() -> None:
+    program = parse("for i in range(0, 47):\n    for j in range(0, 61):\n        Draw(x=i, y=2*j)\n")
+    assert isinstance(program, Program)
+    pattern = compile(program)
+    assert spacing(pattern, pattern.theta) == 1.0
 
 
 def test_half_steps_and_turning_follow_the_variables_that_move_the_draws() -> None:

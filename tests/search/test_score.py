@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from columns import two_kinds_of_columns
 from truth import SMALL, evidence_of, small_scene
 
 from p3i.errors import ProgramError
@@ -92,6 +93,14 @@ def test_equation_2_is_the_naive_sum_over_neighbours_in_sight(features: str) -> 
     assert pairs > 30
     assert found.edges == pairs
     assert found.equation2 == pytest.approx(loss, rel=1e-3)
+
+
+def test_the_score_of_two_kinds_of_columns_does_not_depend_on_their_number() -> None:
+    few, many, odd = (
+        evaluate(*two_kinds_of_columns(rows, columns), CONFIG).normalised
+        for rows, columns in ((24, 24), (30, 30), (27, 31))
+    )
+    assert many == pytest.approx(few, abs=0.03) and odd == pytest.approx(few, abs=0.03)
 
 
 def test_draws_that_coincide_count_once() -> None:

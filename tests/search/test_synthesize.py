@@ -191,6 +191,7 @@ def answered_by(monkeypatch: pytest.MonkeyPatch, program: str, *, structure: str
 
 def test_a_program_that_costs_more_than_it_explains_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     answered_by(monkeypatch, "for j in range(0, 9):\n    Draw(x=9*Cos(40*j), y=9*Sin(40*j))\n")
+    monkeypatch.setattr(synthesize_module, "score_of_program", lambda *_, **__: 0.9)
     result = synthesize(photo(noise()), SearchConfig())
     assert (result.program, result.stop) == (None, StopReason.COSTS_MORE)
     assert result.reason == StopReason.COSTS_MORE.value
@@ -205,6 +206,14 @@ def test_a_ring_that_the_extent_of_the_image_cannot_continue_says_so(monkeypatch
         for config in (SearchConfig(extent="image"), SearchConfig())
     ]
     assert told == [True, False]
+
+
+def test_an_answer_whose_finished_program_scores_too_little_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the family that found it thought of it: no answer is printed with less than it needs."""
+    answered_by(monkeypatch, "for j in range(0, 9):\n    Draw(x=9*Cos(40*j), y=9*Sin(40*j))\n")
+    result = synthesize(photo(noise()), SearchConfig())
+    assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
+    assert result.score is not None and result.score < NEEDED
 
 
 @pytest.mark.parametrize(("radius", "told"), [(5, True), (24, False)])

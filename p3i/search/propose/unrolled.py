@@ -73,7 +73,7 @@ def unroll(
     focal_mm: float,
     about: float | None = None,
 ) -> Strip | None:
-    """The strip about `center` (program units) under a pose (rx, ry in degrees); None if little is seen.
+    """The strip about `center` [2] (program units) under a pose (rx, ry, degrees); None if little is seen.
 
     `about` asks for the radii near this one only.
     """

@@ -20,7 +20,7 @@ class Canvas:
 
     @property
     def plane_from_view(self) -> Array:
-        """The 3 x 3 matrix that takes canvas pixels to program units."""
+        """The matrix [3, 3] that takes canvas pixels to program units."""
         corner = self.middle - self.unit * (self.side - 1) / 2
         return np.array([[self.unit, 0, corner[0]], [0, self.unit, corner[1]], [0, 0, 1.0]])
 
@@ -28,7 +28,8 @@ class Canvas:
 def view_canvas(map_from_plane: Array, size: Size, *, side: int, depth_range: float) -> Canvas | None:
     """The canvas of `side` pixels for a map of this size seen under a homography; None where no plane shows.
 
-    The view reaches to where things are `depth_range` times as far away as the nearest.
+    `map_from_plane` is [3, 3]. The view reaches to where things are `depth_range` times as far away as the
+    nearest.
     """
     x, y = np.meshgrid(np.linspace(0, size.width - 1, 17), np.linspace(0, size.height - 1, 17))
     plane = np.linalg.inv(map_from_plane) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])

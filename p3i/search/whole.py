@@ -1,0 +1,34 @@
+"""A whole program as numbers to fit: its camera and its `Draw`, tied where it writes one number twice.
+
+A circle's radius and angle stand in x and in y and are one number each; apart they would make an ellipse of
+it, and fit what no camera does to a circle.
+"""
+
+from dataclasses import replace
+
+from torch import Tensor
+
+from p3i.grammar.ast import Program
+from p3i.grammar.leaves import leaves
+from p3i.search.fill import Filling, fillings, start_values, unknowns_of, whole_program_sketch
+
+# A step of the angle whose multiple comes back to within so much closes a ring, and stays.
+_CLOSED_DEG = 1e-6
+# All that a program can draw.
+_ALL = 10**9
+
+
+def whole_filling(program: Program) -> tuple[Filling, Tensor] | None:
+    """The program with camera and `Draw` free, but for the step of a closed ring, and its own numbers z [F].
+
+    None for a program that draws fewer than two objects.
+    """
+    sketch = whole_program_sketch(program)
+    step = leaves(program).get("draw.x.angle.j", 0.0)
+    if step and abs(round(360 / step) * step - 360) < _CLOSED_DEG:
+        sketch = replace(
+            sketch, holes=tuple(hole for hole in sketch.holes if not hole.path.endswith(".angle.j"))
+        )
+    filling = next(fillings(sketch, unknowns_of(sketch), most_indices=_ALL, most_settings=1), None)
+    start = None if filling is None else start_values(filling)
+    return None if filling is None or start is None else (filling, start)
