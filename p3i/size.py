@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass
 
+from p3i.errors import UsageError
+
 
 @dataclass(frozen=True, slots=True)
 class Size:
@@ -41,3 +43,12 @@ def parse_size(text: str) -> Size:
     if found is None or not (int(found[1]) and int(found[2])):
         raise ValueError(f"{text!r} is no size: write the width and the height in pixels, as in 640x480")
     return Size(int(found[1]), int(found[2]))
+
+
+def refuse_huge(size: Size, *, max_px: int) -> None:
+    """Raise UsageError where a picture has more pixels than the limit."""
+    if size.width * size.height > max_px:
+        raise UsageError(
+            f"a picture of {size.width:,} x {size.height:,} has more than {max_px:,} pixels; "
+            f"--max-px {size.width * size.height} raises the limit (max_px in Python)"
+        )

@@ -21,7 +21,7 @@ from torch import Tensor
 from p3i.grammar.ast import Affine, Coordinate, Polar, Program
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.camera import Camera, image_from_plane, project
-from p3i.interp.unroll import nest
+from p3i.interp.unroll import distinct, edges, nest
 from p3i.size import Size
 
 
@@ -101,3 +101,19 @@ class Pattern:
 def moving_leaves(program: Program) -> dict[str, float]:
     """The numbers that theta holds, by path: the camera's angles and all in `Draw`, zeros included."""
     return {path: value for path, value in leaves(program).items() if path.startswith(("camera.", "draw."))}
+
+
+def without_doubles(pattern: Pattern) -> Pattern:
+    """The pattern with draws that coincide kept once (DESIGN.md, 2.2)."""
+    centers = pattern.centers().tolist()
+    kept = distinct([(x, y, 0, 0) for x, y in centers])
+    if len(kept) == len(centers):
+        return pattern
+    live = [tuple(pair) for pair in pattern.index[kept].tolist()]
+    return Pattern(
+        pattern.program,
+        pattern.paths,
+        pattern.theta,
+        pattern.index[kept],
+        torch.tensor(edges(live), dtype=torch.int64).reshape(-1, 2),
+    )

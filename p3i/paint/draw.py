@@ -14,7 +14,8 @@ from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
 from p3i.paint import outlines, scene
-from p3i.paint.lens import bent, bent_points
+from p3i.paint.bent import bent
+from p3i.paint.lens import bent_points
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
@@ -28,11 +29,10 @@ from p3i.paint.view import (
     View,
     camera_view,
     fitted_camera_view,
-    refuse_huge,
     straight_view,
 )
 from p3i.records import changed
-from p3i.size import Size
+from p3i.size import Size, refuse_huge
 from p3i.vision.image import Image, read_image
 from p3i.vision.write import encode, write_bytes
 

@@ -18,8 +18,7 @@ from p3i.paint.clip import cut_polygon
 from p3i.paint.placed import Placed
 from p3i.paint.rectify_options import RectifyOptions
 from p3i.paint.straightened import Straightened, upright_from_plane
-from p3i.paint.view import refuse_huge
-from p3i.size import Size
+from p3i.size import Size, refuse_huge
 from p3i.vision.rectangle import largest_rectangle
 
 _FARTHEST, _FARTHEST_OBJECT = 2.5, 4.0

@@ -11,8 +11,8 @@ import numpy as np
 from p3i.grammar.ast import Program
 from p3i.interp.unroll import nest
 from p3i.paint import outlines, scene
+from p3i.paint.bent import bent
 from p3i.paint.draw import RenderedPicture, render
-from p3i.paint.lens import bent
 from p3i.paint.objects import THERE, Object, Objects, objects_of
 from p3i.paint.options import RenderOptions
 from p3i.paint.show_options import ShowOptions

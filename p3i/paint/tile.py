@@ -17,9 +17,8 @@ from p3i.paint.placed import placed
 from p3i.paint.seam import Seam, seam_of, wrapped
 from p3i.paint.supercell import TOLERANCE_DEG
 from p3i.paint.tile_options import TileOptions
-from p3i.paint.view import refuse_huge
 from p3i.records import changed
-from p3i.size import Size
+from p3i.size import Size, refuse_huge
 from p3i.vision.image import Image
 from p3i.vision.resample import resample
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from p3i.errors import UsageError
 from p3i.interp.camera import Camera
 from p3i.paint.clip import cut
 from p3i.size import Size
@@ -91,15 +90,6 @@ def straight_view(camera: Camera, around: np.ndarray, *, size: Size | None, long
     points = around.reshape(-1, 2)
     size, canvas_from_plane = _window(points if len(points) else _NOTHING, size, longer)
     return View(size, canvas_from_plane, camera, plane=True)
-
-
-def refuse_huge(size: Size, *, max_px: int) -> None:
-    """Raise UsageError where a picture has more pixels than the limit."""
-    if size.width * size.height > max_px:
-        raise UsageError(
-            f"a picture of {size.width:,} x {size.height:,} has more than {max_px:,} pixels; "
-            f"--max-px {size.width * size.height} raises the limit (max_px in Python)"
-        )
 
 
 def clip_to_canvas(segments: np.ndarray, size: Size) -> np.ndarray:

@@ -12,9 +12,8 @@ import torch
 from p3i.grammar.ast import Program
 from p3i.interp.compile import compile
 from p3i.interp.pattern import moving_leaves
-from p3i.search.climb import Found
-from p3i.search.coarse import kept_within
-from p3i.search.fill import Filling
+from p3i.search.fill import Filling, kept_within
+from p3i.search.guess import Found
 from p3i.search.patches import spacing
 
 # A start that draws its objects further off than this share of their spacing is none.

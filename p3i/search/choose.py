@@ -28,12 +28,11 @@ from torch import Tensor
 from p3i.grammar.ast import Polar, Program
 from p3i.grammar.leaves import leaves
 from p3i.interp.compile import compile
-from p3i.interp.pattern import Pattern
+from p3i.interp.pattern import Pattern, without_doubles
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.evidence import Evidence
 from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing
-from p3i.search.score import without_doubles
 from p3i.search.thinned import thinned
 
 # Samples of a patch that count as independent of each other: about 7 x 7; in a small patch, pixels two apart.

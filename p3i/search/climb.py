@@ -6,21 +6,14 @@ worse half falls away; what is left descends along the gradient of the generator
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from p3i.interp.camera import project
-from p3i.search.coarse import (
-    BLUR_SHARES,
-    PointMaps,
-    distinct_share,
-    kept_within,
-    samples,
-    score_points,
-)
-from p3i.search.fill import Filling, start_values
+from p3i.search.coarse import BLUR_SHARES, PointMaps, distinct_share, samples, score_points
+from p3i.search.fill import Filling, kept_within, start_values
+from p3i.search.guess import Found
 from p3i.search.session import Session
 
 # Fillings scored in one go, and the most points that may take.
@@ -38,16 +31,6 @@ _DESCENTS = 40
 _DESCENT_RATE = 0.004
 # Fillings whose draws are this close, in steps, are one.
 _SAME = 0.3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """A filling's numbers z [F], which setting of its extents, and the score of its points."""
-
-    filling: Filling
-    z: Tensor
-    setting: int
-    score: float
 
 
 def search_grid(

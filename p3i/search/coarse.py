@@ -226,8 +226,3 @@ def _from_unit(filling: Filling, unit: Tensor) -> Tensor:
         else:
             columns.append(lower + (upper - lower) * u)
     return torch.stack(columns, 1)
-
-
-def kept_within(filling: Filling, z: Tensor) -> Tensor:
-    """z [..., F] inside the limits that a person gave; others may run free."""
-    return torch.minimum(torch.maximum(z, filling.lower), filling.upper)

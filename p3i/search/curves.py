@@ -11,11 +11,11 @@ import torch
 from torch import Tensor
 
 from p3i.interp.camera import project
+from p3i.search.contrast import mean_contrast, placed_right, score_of_curve
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
 from p3i.search.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
 from p3i.search.robust import robust_fit
-from p3i.search.score import mean_contrast, placed_right, score_of_curve
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""

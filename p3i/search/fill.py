@@ -326,3 +326,8 @@ def whole_program_sketch(program: Program, *, table1: bool = False) -> Sketch:
         tied = shared and kind.endswith((".radius", ".angle"))
         holes.append(Hole(path, name=pair.replace(".", "_") if tied else None, start=value))
     return Sketch(program, tuple(holes))
+
+
+def kept_within(filling: Filling, z: Tensor) -> Tensor:
+    """z [..., F] inside the limits that a person gave; others may run free."""
+    return torch.minimum(torch.maximum(z, filling.lower), filling.upper)

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from torch import Tensor
 
 from p3i.interp.camera import image_from_plane
+from p3i.search.fill import Filling
 from p3i.search.lattice import Lattice
 from p3i.size import Size
 
@@ -31,3 +33,13 @@ def tilted(proposal: Proposal, *, rx_deg: float, ry_deg: float, focal_mm: float,
     slopes = (change[:2, :2] - np.outer(origin, change[2, :2])) / moved[2]
     basis = old.basis @ slopes.T
     return Proposal(Lattice(rx_deg, ry_deg, basis, origin), proposal.worth, proposal.local)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A filling's numbers z [F], which setting of its extents, and the score of its points."""
+
+    filling: Filling
+    z: Tensor
+    setting: int
+    score: float

@@ -4,6 +4,7 @@ import numpy as np
 
 from p3i.interp.pattern import Pattern
 from p3i.search.answer import Answer
+from p3i.search.contrast import score_of
 from p3i.search.elsewhere import with_note_of_others
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit, follow, grow
@@ -13,7 +14,6 @@ from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit,
 from p3i.search.primitive import primitive
 from p3i.search.propose.lattice import straightened_proposals, window_proposals
 from p3i.search.result import NEEDED
-from p3i.search.score import score_of
 from p3i.search.session import Session
 
 # So many proposals of each kind are looked at, and so many fits that differ are grown in all.

@@ -13,11 +13,8 @@ from dataclasses import dataclass
 
 import torch
 
-from p3i.grammar.ast import Program
-from p3i.grammar.leaves import with_leaves
 from p3i.interp.camera import project
 from p3i.interp.lens import photo_from_straight
-from p3i.interp.pattern import moving_leaves
 from p3i.search.answer import Answer
 from p3i.search.config import MOST_K1
 from p3i.search.evidence import Evidence
@@ -25,14 +22,11 @@ from p3i.search.patches import Frames, find_objects, frames, spacing
 from p3i.search.refine import free_numbers
 from p3i.search.robust import robust_fit
 from p3i.search.session import Session
+from p3i.search.straight import Straightened, shifted, straightened
 from p3i.search.thinned import thinned
-from p3i.search.whole import whole_filling
-from p3i.size import Size
-from p3i.vision.image import Image
-from p3i.vision.warp import in_frame, pixel_grid, remapped
+from p3i.search.whole import scaled, whole_filling
+from p3i.vision.warp import in_frame
 
-# A straightened canvas is at most so much wider than the photo: what a barrel lens saw beyond is given up.
-_WIDEST = 1.4
 # An object's place is known to this share of the spacing, and no better than this many photo pixels.
 _SHARE_NOISE, _PIXEL_NOISE = 0.03, 0.3
 # k1 before anything is known: none, give or take this.
@@ -46,34 +40,11 @@ _CONVERGED = 0.01
 _MOST_OBJECTS = 300
 _FEWEST_OBJECTS = 12
 _ROUNDS = 3
-# Numbers of a program are rounded as in objects.py.
-_LENGTH_DIGITS = 4
 _K1_DIGITS = 4
 # A fit that runs away ends within what the options take.
 _MOST = 0.95 * MOST_K1
 
 Search = Callable[[Session], list[Answer]]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Straightened:
-    """A photo freed of its lens: `image` on a canvas `scale` times as wide as `photo_size`."""
-
-    image: Image
-    photo_size: Size
-    k1: float
-    scale: float
-
-    def on_photo(self, answer: Answer) -> Answer:
-        """An answer found on `image`, in units of the photo's canvas, with its k1."""
-        focal_mm = None if answer.focal_mm is None else answer.focal_mm * self.scale
-        program = scaled(answer.program, self.scale)
-        return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=self.k1)
-
-    def points_on_photo(self, points_px: torch.Tensor) -> torch.Tensor:
-        """Points [..., 2] in pixels of `image` as pixels of the photo as it was taken."""
-        shifted = _shifted(points_px, self.image.size, self.photo_size)
-        return photo_from_straight(shifted, self.k1, size=self.photo_size)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,34 +59,6 @@ class LensFit:
     def certain(self) -> bool:
         """Whether there is a lens worth correcting."""
         return abs(self.k1) > max(_SIGMAS * self.spread, _LEAST_K1)
-
-
-def straightened(image: Image, k1: float) -> Straightened:
-    """The photo as a pinhole camera of the same focal would show it; what it does not show is unknown."""
-    size = image.size
-    if k1 == 0:
-        return Straightened(image, size, k1, 1.0)
-    widen = min(_WIDEST, max(1.0, 1 / (1 + k1)))
-    margin = math.ceil((widen - 1) / 2 * size.longer)
-    # As many pixels on each side keep the middle; the longer side must remain the longer.
-    canvas = Size(size.width + 2 * margin, size.height + 2 * margin)
-    straight = pixel_grid(canvas, dtype=torch.float32) - margin
-    points, shown = photo_from_straight(straight, k1, size=size)
-    pixels, valid = remapped(image.pixels, image.valid, points.numpy())
-    straight_image = dataclasses.replace(image, pixels=pixels, valid=valid & shown.numpy())
-    return Straightened(straight_image, size, k1, canvas.longer / size.longer)
-
-
-def scaled(program: Program, factor: float) -> Program:
-    """The program with all lengths times `factor`; angles and loops stay."""
-    if factor == 1:
-        return program
-    lengths = {
-        path: round(value * factor, _LENGTH_DIGITS)
-        for path, value in moving_leaves(program).items()
-        if path.startswith("draw.") and ".angle." not in path
-    }
-    return with_leaves(program, lengths)
 
 
 def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit | None:
@@ -165,7 +108,7 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
         )
         straight, _ = project(at, pattern.points_at(index, theta))
         return photo_from_straight(
-            _shifted(straight, canvas, seen.photo_size), moving[..., -1, None, None], size=seen.photo_size
+            shifted(straight, canvas, seen.photo_size), moving[..., -1, None, None], size=seen.photo_size
         )[0]
 
     more = [math.log(focal_mm), seen.k1] if free_focal else [seen.k1]
@@ -199,7 +142,7 @@ def find_with_lens(session: Session, search: Search) -> list[Answer]:
     image = session.evidence.image
     if isinstance(given, float | int):
         seen = straightened(image, given)
-        return [seen.on_photo(answer) for answer in _searched(seen, session, search)[0]]
+        return [_on_photo(seen, answer) for answer in _searched(seen, session, search)[0]]
     plain = found = best = search(session)
     seen, evidence = straightened(image, 0.0), session.evidence
     for _ in range(_ROUNDS):
@@ -215,8 +158,15 @@ def find_with_lens(session: Session, search: Search) -> list[Answer]:
         if not found or (best and found[0].score < best[0].score):
             break
         note = f"lens: k1 = {seen.k1:.3f} +- {told.spread:.3f}, from {told.objects} objects"
-        best = [dataclasses.replace(seen.on_photo(one), notes=(*one.notes, note)) for one in found]
+        best = [dataclasses.replace(_on_photo(seen, one), notes=(*one.notes, note)) for one in found]
     return best
+
+
+def _on_photo(seen: Straightened, answer: Answer) -> Answer:
+    """An answer found on the straightened photo, in units of the photo's canvas, with its k1."""
+    focal_mm = None if answer.focal_mm is None else answer.focal_mm * seen.scale
+    program = scaled(answer.program, seen.scale)
+    return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=seen.k1)
 
 
 def _searched(seen: Straightened, session: Session, search: Search) -> tuple[list[Answer], Evidence]:
@@ -228,11 +178,6 @@ def _searched(seen: Straightened, session: Session, search: Search) -> tuple[lis
     found = search(again)
     session.stopped = again.stopped
     return found, evidence
-
-
-def _shifted(points_px: torch.Tensor, canvas: Size, photo: Size) -> torch.Tensor:
-    """Points on the straightened canvas as points on the photo's, which has the same middle."""
-    return points_px - points_px.new_tensor(canvas.middle) + points_px.new_tensor(photo.middle)
 
 
 def _spacing_px(where: Frames, matrix: torch.Tensor) -> torch.Tensor:

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from p3i.grammar.leaves import leaves
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.curves import CurveFit, measured, registered
+from p3i.search.curves import CurveFit, measured, numbers_of, registered, values_of
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
-from p3i.search.rings import numbers_of, values_of
 from p3i.search.whole import whole_filling
 from p3i.size import Size
 

@@ -12,6 +12,7 @@ from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import sample_points
+from p3i.search.contrast import score_of
 from p3i.search.correlate import find_instances
 from p3i.search.evidence import Evidence, Level
 from p3i.search.extent import find_extent
@@ -20,7 +21,6 @@ from p3i.search.judged import judged_cells
 from p3i.search.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.phase import find_phase
 from p3i.search.robust import fit_instances
-from p3i.search.score import score_of
 from p3i.search.thinned import thinned
 from p3i.vision.warp import in_frame
 

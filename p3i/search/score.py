@@ -5,7 +5,6 @@ The score is a function of photo and finished program (with the focal and the le
 decides what it goes on with, and may refuse an answer that this score would let pass.
 """
 
-import math
 from dataclasses import dataclass
 
 import torch
@@ -14,23 +13,16 @@ from p3i.errors import ProgramError
 from p3i.grammar.ast import Program
 from p3i.interp.camera import project
 from p3i.interp.compile import compile
-from p3i.interp.pattern import Pattern
-from p3i.interp.unroll import distinct, edges
+from p3i.interp.pattern import Pattern, without_doubles
 from p3i.search.config import SearchConfig
+from p3i.search.contrast import mean_contrast, placed_right, score_of, score_of_curve
 from p3i.search.evidence import FINE, Evidence
 from p3i.search.judged import judged_cells, judged_patches, sweeps_cells
-from p3i.search.lens import scaled, straightened
+from p3i.search.straight import straightened
+from p3i.search.whole import scaled
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
-
-# What so many cells explain, chance explains too; on a curve fewer, as there are fewer curves to choose from.
-_FEW = 6
-_FEW_ON_CURVE = 3
-# So much agreement is found on some curve of every photo.
-_CHANCE_OF_CURVE = 0.1
-# A misfit of the objects' places beyond this one counts like it.
-_WORST_MISFIT = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,40 +107,6 @@ def normalised_score(evidence: Evidence, pattern: Pattern) -> float:
     return best
 
 
-def score_of(contrast: torch.Tensor) -> float:
-    """The normalised score, 0 to 1, of cells with this contrast [N].
-
-    Few cells agree by chance, and eight numbers are fitted to them.
-    """
-    return max(0.0, mean_contrast(contrast) * (1 - _FEW / max(len(contrast), _FEW)))
-
-
-def score_of_curve(quality: float, count: int) -> float:
-    """The normalised score, 0 to 1, of `count` objects on a curve; `quality` is at most their mean contrast.
-
-    On any photo some ring can be found that agrees a little; that much is taken off, so that one limit serves
-    all structures (docs/benchmarks.md says what it was calibrated on).
-    """
-    sure = quality * (1 - _FEW_ON_CURVE / max(count, _FEW_ON_CURVE))
-    return max(0.0, (sure - _CHANCE_OF_CURVE) / (1 - _CHANCE_OF_CURVE))
-
-
-def mean_contrast(contrast: torch.Tensor) -> float:
-    """The mean of the contrast [N] of cells or objects, 0 where there are none.
-
-    One that looks more like its half-way neighbour speaks against the pattern, but by half only, since
-    something may lie on it.
-    """
-    if len(contrast) == 0:
-        return 0.0
-    return float((contrast.clamp(min=0) + 0.5 * contrast.clamp(max=0)).mean())
-
-
-def placed_right(mean: float, misfit: float) -> float:
-    """A mean contrast, less where the objects do not stand where the program draws (`patches.misfit`)."""
-    return mean * math.exp(-min(misfit, _WORST_MISFIT))
-
-
 def _equation2(
     evidence: Evidence, pattern: Pattern, points: torch.Tensor, seen: torch.Tensor
 ) -> tuple[float, int]:
@@ -160,19 +118,3 @@ def _equation2(
     values = sample(features.values, at.float())
     difference = values[pairs[:, 0]] - values[pairs[:, 1]]
     return float(difference.square().sum()), len(pairs)
-
-
-def without_doubles(pattern: Pattern) -> Pattern:
-    """The pattern with draws that coincide kept once (DESIGN.md, 2.2)."""
-    centers = pattern.centers().tolist()
-    kept = distinct([(x, y, 0, 0) for x, y in centers])
-    if len(kept) == len(centers):
-        return pattern
-    live = [tuple(pair) for pair in pattern.index[kept].tolist()]
-    return Pattern(
-        pattern.program,
-        pattern.paths,
-        pattern.theta,
-        pattern.index[kept],
-        torch.tensor(edges(live), dtype=torch.int64).reshape(-1, 2),
-    )

@@ -19,16 +19,18 @@ from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.borrowed import written_in
 from p3i.search.centring import centred, standing_out
-from p3i.search.climb import Found, distinct, search_grid
-from p3i.search.coarse import PointMaps, kept_within
+from p3i.search.climb import distinct, search_grid
+from p3i.search.coarse import PointMaps
 from p3i.search.curves import CurveFit, follow, measured
 from p3i.search.fill import (
     Filling,
     fillings,
+    kept_within,
     pinned,
     unknowns_of,
     with_settings,
 )
+from p3i.search.guess import Found
 from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
 from p3i.search.score import score_of_program

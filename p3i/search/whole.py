@@ -9,11 +9,14 @@ from dataclasses import replace
 from torch import Tensor
 
 from p3i.grammar.ast import Program
-from p3i.grammar.leaves import leaves
+from p3i.grammar.leaves import leaves, with_leaves
+from p3i.interp.pattern import moving_leaves
 from p3i.search.fill import Filling, fillings, start_values, unknowns_of, whole_program_sketch
 
 # A step of the angle whose multiple comes back to within so much closes a ring, and stays.
 _CLOSED_DEG = 1e-6
+# Numbers of a program are rounded as in objects.py.
+_LENGTH_DIGITS = 4
 # All that a program can draw.
 _ALL = 10**9
 
@@ -32,3 +35,15 @@ def whole_filling(program: Program) -> tuple[Filling, Tensor] | None:
     filling = next(fillings(sketch, unknowns_of(sketch), most_indices=_ALL, most_settings=1), None)
     start = None if filling is None else start_values(filling)
     return None if filling is None or start is None else (filling, start)
+
+
+def scaled(program: Program, factor: float) -> Program:
+    """The program with all lengths times `factor`; angles and loops stay."""
+    if factor == 1:
+        return program
+    lengths = {
+        path: round(value * factor, _LENGTH_DIGITS)
+        for path, value in moving_leaves(program).items()
+        if path.startswith("draw.") and ".angle." not in path
+    }
+    return with_leaves(program, lengths)

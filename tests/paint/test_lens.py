@@ -5,8 +5,8 @@ import torch
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, Program
 from p3i.interp.lens import photo_from_straight
+from p3i.paint.bent import bent
 from p3i.paint.draw import render
-from p3i.paint.lens import bent
 from p3i.paint.scene import Strokes
 from p3i.size import Size
 from p3i.vision.image import Image

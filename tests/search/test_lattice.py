@@ -156,7 +156,7 @@ def naive_cells(lattice: Lattice, *, least_px: float, reach: int = 60) -> dict[t
 def test_the_cells_in_view_are_those_whose_corners_are(lattice: Lattice, least_px: float) -> None:
     assume(np.linalg.norm(lattice.basis, axis=1).min() > 6)
     expected = naive_cells(lattice, least_px=least_px)
-    # How small cells are is looked up on a grid over the picture: on the edge of that limit one may be missed.
+    # How small cells are is looked up on a grid over the picture: at the limit one may be missed.
     sure = {cell for cell, area in expected.items() if area > 1.1 * least_px**2}
     found = cells_in_view(
         blank_level(), PATTERN, lattice.theta(PATTERN), least_px=least_px, most=10_000, cut=False

@@ -14,9 +14,10 @@ from p3i.grammar.leaves import leaves
 from p3i.grammar.parser import parse
 from p3i.interp.lens import photo_from_straight, straight_from_photo
 from p3i.search.config import SearchConfig
-from p3i.search.lens import scaled, straightened
 from p3i.search.result import SynthesisResult
+from p3i.search.straight import straightened
 from p3i.search.synthesize import synthesize
+from p3i.search.whole import scaled
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.warp import pixel_grid

@@ -14,8 +14,9 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, Polar, Progra
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
 from p3i.search.config import SearchConfig
+from p3i.search.contrast import score_of
 from p3i.search.evidence import Evidence
-from p3i.search.score import evaluate, score_of
+from p3i.search.score import evaluate
 from p3i.vision.image import Image
 
 CONFIG = SearchConfig()
