@@ -2,6 +2,8 @@
 
 import glob
 import os
+import stat
+import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -79,3 +81,26 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"cannot make the folder {path}: {error.strerror or error}") from error
+
+
+def read_bytes(path: str | os.PathLike[str], *, what: str = "picture") -> bytes:
+    """The bytes of a file, or of standard input for `-`; it is opened once, so that a pipe will do.
+
+    `what` it should be stands in the sentence of a FileError, which is raised for all that cannot be read.
+    """
+    if os.fspath(path) == "-":
+        return sys.stdin.buffer.read()
+    try:
+        mode = Path(path).stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise FileError(f"{path} is a folder, not a {what}")
+        if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
+            raise FileError(f"{path} is a device, not a {what}")
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise FileError(f"there is no file {path}") from None
+    except PermissionError:
+        raise FileError(f"there is no permission to read {path}") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise FileError(f"{path} cannot be read: {reason}") from None

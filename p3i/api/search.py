@@ -7,9 +7,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from p3i.api.refusal import refuses_unknown
+from p3i.carried import read_program
 from p3i.errors import UsageError
 from p3i.grammar.ast import Header, Program
-from p3i.language import load, load_sketch
+from p3i.language import load_sketch
+from p3i.records import changed
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
 
@@ -27,6 +30,7 @@ Progress = Callable[[str, float], None]
 Trace = Callable[[Mapping[str, Any]], None]
 
 
+@refuses_unknown
 def read_image(path: str | os.PathLike[str], *, max_px: int | None = None) -> "Image":
     """The photo at `path`, upright, RGB in 0..1, with its mask of known pixels and its focal.
 
@@ -61,15 +65,12 @@ def synth(
     Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
     UsageError for options that cannot be, FileError for a photo or mask that cannot be read.
     """
-    from p3i.search.synthesize import synthesize
-
-    known = {field.name for field in dataclasses.fields(SearchConfig)}
-    if unknown := sorted(options.keys() - known):
-        raise UsageError(f"synth has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    for name, reader in (("sketch", load_sketch), ("start", load)):
+    for name, reader in (("sketch", load_sketch), ("start", read_program)):
         if isinstance(options.get(name), str | os.PathLike):
             options[name] = reader(options[name])
-    config = dataclasses.replace(config or SearchConfig(), **options)
+    config = changed(config or SearchConfig(), options, verb="synth")
+    from p3i.search.synthesize import synthesize
+
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
     result = synthesize(without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
     name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
@@ -82,18 +83,22 @@ def score(
     photo: "str | os.PathLike[str] | Image",
     program: Program | str | os.PathLike[str],
     config: SearchConfig | None = None,
+    **options: Any,
 ) -> "Evaluation":
     """How well `program` explains `photo`: equation 2 as printed in the paper, and the normalised score.
 
-    Raises FileError or ParseError where photo or program cannot be read.
+    `options` change `config` as in `synth`. Raises UsageError for options that cannot be, FileError or
+    ParseError where photo or program cannot be read.
     """
+    asked = changed(config or SearchConfig(), options, verb="score")
     from p3i.search.score import evaluate
 
+    given = program if isinstance(program, Program) else read_program(program)
     image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    tree = program if isinstance(program, Program) else load(Path(program))
-    return evaluate(image, tree, config or SearchConfig())
+    return evaluate(image, given, asked)
 
 
+@refuses_unknown
 def trace(trace: str | os.PathLike[str], *, image: str | os.PathLike[str] | None = None) -> "Film":
     """The search that `p3i synth --trace` wrote down, as pictures over its photo.
 
@@ -121,11 +126,12 @@ def eval_set(
     `options` change `config` as in `synth`. With `results`, a file of the JSON lines that `synth` printed,
     nothing is searched. `jobs` is the number of processes. Raises FileError and UsageError.
     """
+    asked = changed(config or SearchConfig(), options, verb="eval_set")
     from p3i.evaluation.score_set import score_set
 
     return score_set(
         Path(folder),
-        dataclasses.replace(config or SearchConfig(), **options),
+        asked,
         results=None if results is None else Path(results),
         jobs=jobs,
         only=only,
@@ -134,6 +140,7 @@ def eval_set(
     )
 
 
+@refuses_unknown
 def examples(
     folder: str | os.PathLike[str],
     *,

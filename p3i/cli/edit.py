@@ -7,7 +7,6 @@ import click
 from p3i import api
 from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
-from p3i.errors import UsageError
 from p3i.paint.edit_options import EditOptions, parse_scale
 from p3i.records import told
 
@@ -15,9 +14,9 @@ sentence, _ = told(EditOptions)
 
 
 @click.command("edit", short_help="Lay a photo's objects anew by a changed program.")
-@click.argument("photo", metavar="PHOTO", type=click.Path())
-@click.argument("old", metavar="OLD", type=click.Path())
-@click.argument("new", metavar="NEW", type=click.Path())
+@click.argument("photo", metavar="PHOTO", type=options.INPUT)
+@click.argument("old", metavar="OLD", type=options.INPUT)
+@click.argument("new", metavar="NEW", type=options.INPUT)
 @options.output("Where to write the picture, the kind by the suffix; - is stdout.")
 @kind_option
 @json_option
@@ -34,8 +33,6 @@ def command(**given: Any) -> None:
     are put where NEW draws. NEW is seen by OLD's camera unless it names its own.
     """
     photo, old, new = given["photo"], given["old"], given["new"]
-    if [photo, old, new].count("-") > 1:
-        raise UsageError("only one input can be standard input")
     asked = EditOptions(scale=parse_scale(given["scale"]), focal_mm=given["focal_mm"])
     outputs = Outputs.of(given, inputs=(photo, old, new))
     with progress.bar(photo, wanted=not given["quiet"]) as update:

@@ -36,8 +36,6 @@ def command(**given: Any) -> None:
     is added; what is not pattern is continued smoothly. Without PROG the program is searched for.
     """
     photo, program = given["photo"], given["program"]
-    if photo == program == "-":
-        raise UsageError("only one input can be standard input")
     if given["by"] is not None and given["cells"] is not None:
         raise UsageError("--by and --cells both say how far: give one of them")
     by = default("by")

@@ -9,7 +9,6 @@ import click
 from p3i import api
 from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, kind_option
-from p3i.errors import UsageError
 from p3i.paint.inpaint_options import METHODS, InpaintOptions
 from p3i.records import told
 
@@ -18,7 +17,7 @@ sentence, default = told(InpaintOptions)
 
 @click.command("inpaint", short_help="Fill a hole in a photo by its pattern.")
 @options.photo_and_program
-@click.option("--mask", metavar="FILE", type=click.Path(), help="A picture whose white pixels are filled.")
+@click.option("--mask", metavar="FILE", type=options.INPUT, help="A picture whose white pixels are filled.")
 @click.option(
     "--remove",
     metavar="I,J|NAME",
@@ -51,8 +50,6 @@ def command(**given: Any) -> None:
         chosen["checkpoint"] = Path(chosen["checkpoint"])
     asked = InpaintOptions(**chosen)
     photo, program, mask = given["photo"], given["program"], given["mask"]
-    if [photo, program, mask].count("-") > 1:
-        raise UsageError("only one input can be standard input")
     outputs = Outputs.of({**given, "json_to": None}, inputs=(photo, program, mask))
     with progress.bar(photo, wanted=not given["quiet"]) as update:
         found = api.inpaint(photo, program, asked, mask=mask, remove=given["remove"], progress=update)

@@ -27,7 +27,7 @@ _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
 
 
 @click.command("points", short_help="List the objects: places, names, cells, and whether each is there.")
-@click.argument("programs", metavar="PROG|PHOTO...", nargs=-1, required=True)
+@click.argument("programs", metavar="PROG|PHOTO...", type=options.INPUT, nargs=-1, required=True)
 @options.output("Where to write, the format by the suffix; - is stdout. Several inputs need a folder.")
 @click.option(
     "--format",
@@ -37,7 +37,12 @@ _ENDINGS = {"coco": ".coco.json", "labelme": ".json"}
     help="How to write the list. [default: by the name of -o, else csv]",
 )
 @options.force
-@click.option("--image", metavar="PHOTO", help="The photo of the program: says which objects are there.")
+@click.option(
+    "--image",
+    type=options.INPUT,
+    metavar="PHOTO",
+    help="The photo of the program: says which objects are there.",
+)
 @click.option(
     "--size",
     type=SizeType(),

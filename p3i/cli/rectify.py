@@ -30,7 +30,7 @@ sentence, default = told(RectifyOptions)
 @click.option(
     "--back",
     metavar="EDITED",
-    type=click.Path(),
+    type=options.INPUT,
     help="Write the photo instead, with what was edited in this picture of the same view.",
 )
 @click.option("--tolerance", type=float, metavar="T", help=sentence("tolerance"))
@@ -50,8 +50,6 @@ def command(**given: Any) -> None:
     if asked.tolerance is not None and given["back"] is None:
         raise UsageError("--tolerance belongs to --back")
     photo, program, edited = given["photo"], given["program"], given["back"]
-    if [photo, program, edited].count("-") > 1:
-        raise UsageError("only one input can be standard input")
     outputs = Outputs.of(given, inputs=(photo, program, edited))
     with progress.bar(photo, wanted=not given["quiet"]) as update:
         found = api.rectify(photo, program, asked, progress=update)

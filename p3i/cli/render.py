@@ -39,7 +39,7 @@ class SizeType(click.ParamType):
 
 
 @click.command("render", short_help="Draw a program as PNG, SVG or PDF, also over its photo.")
-@click.argument("programs", metavar="PROG...", nargs=-1, required=True)
+@click.argument("programs", metavar="PROG...", type=options.INPUT, nargs=-1, required=True)
 @options.output("Where to draw, the kind by the suffix; - is stdout. Several programs need a folder.")
 @click.option(
     "--format",
@@ -49,8 +49,13 @@ class SizeType(click.ParamType):
     help="The kind of picture. [default: by the name of -o, else png]",
 )
 @options.force
-@click.option("--image", metavar="PHOTO", help="Draw over this photo.")
-@click.option("--sprite", metavar="FILE", help="A picture to stand at each object, warped by the camera.")
+@click.option("--image", type=options.INPUT, metavar="PHOTO", help="Draw over this photo.")
+@click.option(
+    "--sprite",
+    type=options.INPUT,
+    metavar="FILE",
+    help="A picture to stand at each object, warped by the camera.",
+)
 @click.option("--sprite-units", type=float, metavar="U", help=sentence("sprite_units"))
 @click.option(
     "--size",

@@ -12,8 +12,8 @@ from p3i.search.config import SearchConfig
 
 
 @click.command("score", short_help="Say how well a program explains a photo.")
-@click.argument("image", metavar="IMAGE", type=click.Path())
-@click.argument("program", metavar="PROG", type=click.Path())
+@click.argument("image", metavar="PHOTO", type=options.INPUT)
+@click.argument("program", metavar="PROG", type=options.INPUT)
 @click.option(
     "--format",
     "form",

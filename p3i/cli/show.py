@@ -18,8 +18,8 @@ sentence, default = told(ShowOptions)
 
 
 @click.command("show", short_help="Draw the program over its photo: objects, cells, names, horizon, extent.")
-@click.argument("photo", metavar="PHOTO")
-@click.argument("program", metavar="[PROG]", required=False)
+@click.argument("photo", metavar="PHOTO", type=options.INPUT)
+@click.argument("program", metavar="[PROG]", type=options.INPUT, required=False)
 @options.output("Where to draw, the kind by the suffix; - is stdout.")
 @click.option(
     "--format",

@@ -10,7 +10,6 @@ from p3i import api
 from p3i.cli import options, progress
 from p3i.cli.pictures import Outputs, json_option, kind_option
 from p3i.cli.render import SizeType
-from p3i.errors import UsageError
 from p3i.paint.tile_options import SOURCES, TileOptions
 from p3i.records import told
 
@@ -57,8 +56,6 @@ def command(**given: Any) -> None:
     names = {field.name for field in dataclasses.fields(TileOptions)}
     asked = TileOptions(**{name: value for name, value in given.items() if name in names})
     photo, program = given["photo"], given["program"]
-    if photo == "-" and program == "-":
-        raise UsageError("only one input can be standard input")
     outputs = Outputs.of(given, inputs=(photo, program))
     with progress.bar(photo, wanted=not given["quiet"]) as update:
         found = api.tile(photo, program, asked, progress=update)

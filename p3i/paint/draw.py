@@ -1,7 +1,7 @@
 """Programs as pictures: alone, over their photo, or straightened; with dots, cells, or pictures."""
 
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
+from p3i.marks import PNG_KEYWORD
 from p3i.paint import outlines, scene
 from p3i.paint.lens import bent, bent_points, straight_photo
 from p3i.paint.options import KINDS, RenderOptions, kind_of
@@ -20,7 +21,6 @@ from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
 from p3i.paint.placed import FocalSource, camera_of
 from p3i.paint.raster import paint
-from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.sprite import lay, sprite_of
 from p3i.paint.svg import svg
 from p3i.paint.view import (
@@ -101,7 +101,7 @@ class RenderedPicture:
 
 
 def render(
-    program: Program | Path_,
+    program: Program,
     options: RenderOptions | None = None,
     *,
     image: Path_ | Image | None = None,
@@ -111,18 +111,12 @@ def render(
 ) -> RenderedPicture:
     """Draw a program: dots coloured by loop index, cells, horizon, or a picture at each object.
 
-    `program` may be a file, also a PNG or SVG that was drawn here before. With `image` the drawing goes over
-    that photo; with `plane` the plane is seen straight on (and the photo straightened). `sprite` stands at
-    every object, flat on the plane, and wins over the picture named in `Draw`, which is looked up beside the
-    program's file, or in the folder `beside`. `changes` are fields of RenderOptions.
-
-    Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
-    sketches among them, UsageError for options that cannot be.
+    With `image` the drawing goes over that photo; with `plane` the plane is seen straight on (and the photo
+    straightened). `sprite` stands at every object, flat on the plane, and wins over the picture named in
+    `Draw`, which is looked up in the folder `beside` (the working folder). `changes` are fields of
+    RenderOptions. Raises FileError for pictures that cannot be read, UsageError for options that cannot be.
     """
     options = changed(options or RenderOptions(), changes, verb="render")
-    if not isinstance(program, Program):
-        beside = Path(fspath(program)).parent if beside is None else beside
-        program = read_program(program)
     folder = Path(beside or ".")
     photo = read_image(image) if isinstance(image, str | PathLike) else image
     camera, focal_source = camera_of(program, photo, focal_mm=options.focal_mm)
@@ -158,7 +152,7 @@ def render(
 
 
 def overlay(
-    image: Path_ | Image, program: Program | Path_, options: RenderOptions | None = None, **changes: Any
+    image: Path_ | Image, program: Program, options: RenderOptions | None = None, **changes: Any
 ) -> RenderedPicture:
     """The photo with the program drawn over it; `render` with `image`, for callers who start at the photo."""
     return render(program, options, image=image, **changes)

@@ -5,15 +5,13 @@ A picture made s times smaller maps its point u to the point (u + 0.5) * s - 0.5
 """
 
 import os
-import stat
-import sys
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import cv2
 import numpy as np
 
 from p3i.errors import FileError
+from p3i.files import read_bytes
 from p3i.size import Size
 from p3i.vision.decode import Source, decode
 from p3i.vision.write import write_image as write_image
@@ -61,7 +59,12 @@ def read_image(path: str | os.PathLike[str], *, max_px: int = MAX_PX) -> Image:
     animation the first frame (a note says so). Raises FileError, with a reason of its own for each: missing,
     a folder, no permission, empty, no picture, cut off, HEIC without its extra, more than `max_px` pixels.
     """
-    found = decode(_read_bytes(path), name=_name(path), max_px=max_px)
+    return image_of(read_bytes(path), name=_name(path), max_px=max_px)
+
+
+def image_of(data: bytes, *, name: str, max_px: int = MAX_PX) -> Image:
+    """The photo that a file's bytes hold, as `read_image`; `name` is the file's in errors."""
+    found = decode(data, name=name, max_px=max_px)
     return Image(found.pixels, found.known, found.focal_mm, found.source, found.notes)
 
 
@@ -72,7 +75,7 @@ def read_mask(path: str | os.PathLike[str], size: Size, *, max_px: int = MAX_PX)
     `size` (as it stands upright), has colours, marks nothing or marks everything.
     """
     name = _name(path)
-    found = decode(_read_bytes(path), name=name, max_px=max_px)
+    found = decode(read_bytes(path), name=name, max_px=max_px)
     height, width = found.known.shape
     if (width, height) != (size.width, size.height):
         raise FileError(
@@ -135,23 +138,3 @@ def _area_mean(array: np.ndarray, scale: float) -> np.ndarray:
 
 def _name(path: str | os.PathLike[str]) -> str:
     return "standard input" if os.fspath(path) == "-" else os.fspath(path)
-
-
-def _read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a file, or of standard input for `-`; FileError with the reason where that fails."""
-    if os.fspath(path) == "-":
-        return sys.stdin.buffer.read()
-    try:
-        mode = Path(path).stat().st_mode
-        if stat.S_ISDIR(mode):
-            raise FileError(f"{path} is a folder, not a picture")
-        if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
-            raise FileError(f"{path} is a device, not a picture")
-        return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise FileError(f"there is no file {path}") from None
-    except PermissionError:
-        raise FileError(f"there is no permission to read {path}") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise FileError(f"{path} cannot be read: {reason}") from None

@@ -12,7 +12,6 @@ from click import unstyle
 from p3i import api
 from p3i.api import pictures
 from p3i.cli.main import run
-from p3i.paint.source import is_photo
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.vision.image import read_image
 from p3i.vision.write import write_image
@@ -119,7 +118,6 @@ def test_a_photo_without_a_pattern_exits_with_5(
 
 def test_a_picture_drawn_here_is_a_program(folder: Path, capsys) -> None:
     assert run(["render", "grid.p3p", "-o", "drawn.png"]) == 0
-    assert not is_photo("drawn.png") and is_photo("photo.png")
     assert run(["points", "drawn.png"]) == 0
     assert capsys.readouterr().out.count("\n") == 13
 
