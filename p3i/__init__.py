@@ -106,9 +106,10 @@ __all__ = [  # noqa: RUF022  # in the order of use
     "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score", "check",
     "format", "expand", "examples", "trace", "eval_set", "load", "load_sketch", "loads", "dump", "dumps",
     "read_image", "Program", "Sketch", "Diagnostic", "Image", "Size", "Camera", "SearchConfig",
-    "SynthesisResult", "Candidate", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions", "RectifyOptions",
-    "TileOptions", "InpaintOptions", "ExtendOptions", "EditOptions", "CellSize", "parse_cell", "Margins", "parse_margins",
-    "P3IError", "UsageError", "FileError", "ProgramError", "ParseError", "NoPatternError",
+    "SynthesisResult", "Candidate", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions",
+    "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions", "EditOptions", "CellSize",
+    "parse_cell", "Margins", "parse_margins", "P3IError", "UsageError", "FileError", "ProgramError",
+    "ParseError", "NoPatternError",
 ]  # fmt: skip
 
 
