@@ -41,7 +41,7 @@ def read_program(path: Place) -> Program:
     text is no program, or a sketch whose holes are still open.
     """
     name = _name(path)
-    data = read_bytes(path, what="program")
+    data = read_bytes(path)
     return _parsed(data if (text := _carried(data, name)) is None else text, name)
 
 
@@ -51,7 +51,7 @@ def read_either(path: Place) -> "Program | Image":
     The file is read once. Raises FileError for what cannot be read, ParseError for a text that is no program.
     """
     name = _name(path)
-    data = read_bytes(path, what="program or picture")
+    data = read_bytes(path)
     if not _is_photo(data):
         return _parsed(data if (text := _carried(data, name)) is None else text, name)
     from p3i.vision.image import image_of

@@ -83,19 +83,19 @@ def make_folder(path: Path) -> None:
         raise FileError(f"cannot make the folder {path}: {error.strerror or error}") from error
 
 
-def read_bytes(path: str | os.PathLike[str], *, what: str = "picture") -> bytes:
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a file, or of standard input for `-`; it is opened once, so that a pipe will do.
 
-    `what` it should be stands in the sentence of a FileError, which is raised for all that cannot be read.
+    Raises FileError with the reason where it cannot be read.
     """
     if os.fspath(path) == "-":
         return sys.stdin.buffer.read()
     try:
         mode = Path(path).stat().st_mode
         if stat.S_ISDIR(mode):
-            raise FileError(f"{path} is a folder, not a {what}")
+            raise FileError(f"{path} is a folder, not a file")
         if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
-            raise FileError(f"{path} is a device, not a {what}")
+            raise FileError(f"{path} is a device, not a file")
         return Path(path).read_bytes()
     except FileNotFoundError:
         raise FileError(f"there is no file {path}") from None

@@ -43,6 +43,7 @@ LIGHT += [
     "p3i.search.record",
     "p3i.interp.unroll",
     "p3i.paint.options",
+    "p3i.paint.picture_kinds",
     "p3i.paint.rectify_options",
     "p3i.paint.tile_options",
     "p3i.paint.points_options",

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from p3i.api.search import Progress, read_image, synth, without
+from p3i.api.search import Progress, photo_and_program, read_image, without
 from p3i.carried import read_either, read_program
-from p3i.errors import NoPatternError, UsageError
+from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.paint.edit_options import EditOptions
 from p3i.paint.extend_options import ExtendOptions
@@ -74,7 +74,7 @@ def show(
     asked = changed(options or ShowOptions(), changes, verb="show")
     from p3i.paint.show import show as draw
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
+    image, found = photo_and_program(photo, program, config, progress=progress)
     return draw(image, found, asked)
 
 
@@ -111,7 +111,7 @@ def points(
     if image is None:
         assert given is not None
         return objects_of(given, None, asked)
-    photo, found = _photo_and_program(image, given, config, progress=progress)
+    photo, found = photo_and_program(image, given, config, progress=progress)
     return objects_of(found, photo, asked, image=name)
 
 
@@ -133,7 +133,7 @@ def rectify(
     asked = changed(options or RectifyOptions(), changes, verb="rectify")
     from p3i.paint.rectify import rectify as straighten
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
+    image, found = photo_and_program(photo, program, config, progress=progress)
     return straighten(image, found, asked)
 
 
@@ -155,7 +155,7 @@ def tile(
     asked = changed(options or TileOptions(), changes, verb="tile")
     from p3i.paint.tile import tile as make
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
+    image, found = photo_and_program(photo, program, config, progress=progress)
     return make(image, found, asked)
 
 
@@ -186,7 +186,7 @@ def inpaint(
 
         mask = read_mask(mask, image.size)  # once: it may come from standard input, and is needed twice
     seen = without(image, mask=mask, roi=None) if program is None else image
-    _, found = _photo_and_program(seen, program, config, progress=progress)
+    _, found = photo_and_program(seen, program, config, progress=progress)
     return fill(image, found, asked, mask=mask, remove=remove, progress=progress)
 
 
@@ -208,7 +208,7 @@ def extend(
     asked = changed(options or ExtendOptions(), changes, verb="extend")
     from p3i.paint.extend import extend as continue_photo
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
+    image, found = photo_and_program(photo, program, config, progress=progress)
     return continue_photo(image, found, asked, progress=progress)
 
 
@@ -232,29 +232,8 @@ def edit(
     from p3i.paint.edit import edit as lay_anew
 
     wanted = _in_memory(new)
-    image, found = _photo_and_program(photo, old, config, progress=progress)
+    image, found = photo_and_program(photo, old, config, progress=progress)
     return lay_anew(image, found, wanted, asked)
-
-
-def _photo_and_program(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None,
-    config: SearchConfig | None = None,
-    *,
-    progress: Progress | None = None,
-) -> "tuple[Image, Program]":
-    """Both in memory: read where they are files, the program found by `synth` where there is none.
-
-    Raises NoPatternError where none is found, FileError and ParseError for files that cannot be read.
-    """
-    given = None if program is None else _in_memory(program)  # read first: it is soon known to be wrong
-    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    if given is not None:
-        return image, given
-    result = synth(image, config, progress=progress)
-    if result.program is None:
-        raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
-    return image, result.program
 
 
 def _in_memory(program: Program | str | os.PathLike[str]) -> Program:

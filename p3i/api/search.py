@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from p3i.api.refusal import refuses_unknown
 from p3i.carried import read_program
-from p3i.errors import UsageError
+from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Header, Program
 from p3i.language import load_sketch
 from p3i.records import changed
@@ -81,21 +81,45 @@ def synth(
 
 def score(
     photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str],
+    program: Program | str | os.PathLike[str] | None = None,
     config: SearchConfig | None = None,
+    *,
+    progress: Progress | None = None,
     **options: Any,
 ) -> "Evaluation":
     """How well `program` explains `photo`: equation 2 as printed in the paper, and the normalised score.
 
-    `options` change `config` as in `synth`. Raises UsageError for options that cannot be, FileError or
-    ParseError where photo or program cannot be read.
+    Without a program it is the one that `synth` finds. `options` change `config` as in `synth`. Raises
+    UsageError for options that cannot be, FileError or ParseError where photo or program cannot be read,
+    NoPatternError for a photo without a pattern.
     """
     asked = changed(config or SearchConfig(), options, verb="score")
     from p3i.search.score import evaluate
 
-    given = program if isinstance(program, Program) else read_program(program)
-    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    image, given = photo_and_program(photo, program, asked, progress=progress)
     return evaluate(image, given, asked)
+
+
+def photo_and_program(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None,
+    config: SearchConfig | None = None,
+    *,
+    progress: Progress | None = None,
+) -> "tuple[Image, Program]":
+    """Both in memory: read where they are files, the program found by `synth` where there is none.
+
+    Raises NoPatternError where none is found, FileError and ParseError for files that cannot be read.
+    """
+    # The program first: it is soon known to be wrong.
+    given = program if isinstance(program, Program | None) else read_program(program)
+    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    if given is not None:
+        return image, given
+    result = synth(image, config, progress=progress)
+    if result.program is None:
+        raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
+    return image, result.program
 
 
 @refuses_unknown

@@ -1,35 +1,15 @@
 """The options that several commands share, each written once."""
 
-import os
-from collections.abc import Callable
-from typing import Any
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import click
 
 from p3i.records import told
 
+Record = TypeVar("Record")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-
-class Input(click.Path):
-    """A file to read; `-` is standard input, which can be read once, so that one argument of a call is it."""
-
-    _READ = "p3i.standard_input"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> str | bytes | os.PathLike[str]:
-        if value == "":
-            self.fail("an empty name names no file", param, ctx)
-        if value == "-" and ctx is not None:
-            if self._READ in ctx.meta:
-                self.fail("only one input can be standard input", param, ctx)
-            ctx.meta[self._READ] = True
-        return super().convert(value, param, ctx)
-
-
-INPUT = Input()
-"""The type of every argument and option that names a file to read."""
 
 error_format: Decorator = click.option(
     "--error-format",
@@ -86,7 +66,10 @@ def max_px(record: type) -> Decorator:
     return field(record, "max_px", type=int, metavar="N")
 
 
-def photo_and_program(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The arguments `PHOTO [PROG]`; both arrive as text, `program` as None where there is none."""
-    program = click.argument("program", metavar="[PROG]", type=INPUT, required=False)
-    return click.argument("photo", metavar="PHOTO", type=INPUT)(program(command))
+def chosen(record: type[Record], given: Mapping[str, Any], **changes: Any) -> Record:
+    """The record that the values of its options make; `changes` come before them.
+
+    Fields that are no option of the command keep their default. Raises what the record raises.
+    """
+    names = {each.name for each in dataclasses.fields(record)}  # pyright: ignore[reportArgumentType]
+    return record(**{name: given[name] for name in given if name in names} | changes)

@@ -1,4 +1,4 @@
-"""`p3i score`: how well a program explains a photo."""
+"""`p3i score`: how well programs explain photos."""
 
 import json
 from pathlib import Path
@@ -7,21 +7,23 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import options, search_options
+from p3i.cli import batch, inputs, options, search_options, targets
+from p3i.cli.pictures import Job, each_photo
+from p3i.cli.targets import Kinds
 from p3i.search.config import SearchConfig
+
+SCORES = Kinds(
+    by_suffix={".txt": "text", ".json": "json"},
+    endings={"text": ".txt"},
+    text=frozenset({"text", "json"}),
+    lines=frozenset({"text", "json"}),
+    what="form of the numbers",
+)
 
 
 @click.command("score", short_help="Say how well a program explains a photo.")
-@click.argument("image", metavar="PHOTO", type=options.INPUT)
-@click.argument("program", metavar="PROG", type=options.INPUT)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="How to print the numbers.",
-)
+@inputs.words("PHOTO... [PROG]")
+@targets.written(SCORES, "Where to write the numbers.")
 @click.option(
     "--focal",
     "focal_mm",
@@ -31,30 +33,41 @@ from p3i.search.config import SearchConfig
 )
 @search_options.features
 @search_options.weights
-@search_options.device
 @search_options.threads
+@options.quiet
+@options.verbose
 @options.error_format
-def command(
-    image: str, program: str, form: str, weights: str | None, error_format: str, **chosen: Any
-) -> None:
-    """Compare the photo IMAGE with itself at the neighbouring draws of the program PROG.
+def command(**given: Any) -> int:
+    """Compare each PHOTO with itself at the neighbouring draws of the program PROG.
 
     Prints equation 2 of the paper as printed there (the sum of squared feature differences over the
     edges; less is better, but a smaller pattern has less too) and the normalised score (more is better),
-    by which `p3i synth` chooses.
+    by which `p3i synth` chooses. Without PROG the program is searched for.
     """
-    config = SearchConfig(weights=Path(weights) if weights else None, **chosen)
-    found = api.score(image, program, config)
-    if form == "json":
-        record = {
-            "image": image,
-            "program": program,
+    weights = Path(given["weights"]) if given["weights"] else None
+    config = options.chosen(SearchConfig, given, weights=weights)
+
+    def judge(job: Job) -> batch.Answer:
+        found = api.score(job.photo, job.program, config, progress=job.update)
+        facts = {
+            "image": job.photo,
+            "program": job.program_name,
             "equation2": found.equation2,
             "edges": found.edges,
             "score": found.normalised,
             "features": config.features,
         }
-        click.echo(json.dumps(record))
-        return
-    click.echo(f"score       {found.normalised:.4f}   normalised; more is better")
-    click.echo(f"equation 2  {found.equation2:.6g}   over {found.edges} edges, as printed; less is better")
+        lines = (
+            f"score       {found.normalised:.4f}   normalised; more is better",
+            f"equation 2  {found.equation2:.6g}   over {found.edges} edges, as printed; less is better",
+        )
+        if job.one_of_many:
+            lines = (f"{job.photo}:", *lines)
+        text = json.dumps(facts) if job.kind == "json" else "\n".join(lines)
+        return batch.Answer(
+            make=lambda: batch.Made(f"{text}\n".encode()),
+            facts=lambda: facts,
+            more=[f"{found.objects} objects in sight"],
+        )
+
+    return each_photo(given, judge, kinds=SCORES)

@@ -1,14 +1,13 @@
-"""`p3i tile`: a photo in, a seamless texture of its pattern's cell out."""
+"""`p3i tile`: a photos in, seamless textures of their patterns' cells out."""
 
-import dataclasses
 import re
 from typing import Any
 
 import click
 
 from p3i import api
-from p3i.cli import options, progress
-from p3i.cli.pictures import Outputs, json_option, kind_option
+from p3i.cli import batch, inputs, options, targets
+from p3i.cli.pictures import PICTURES, Job, each_photo, made
 from p3i.cli.render import SizeType
 from p3i.paint.tile_options import SOURCES, TileOptions
 from p3i.records import told
@@ -33,11 +32,8 @@ class RepeatType(click.ParamType):
 
 
 @click.command("tile", short_help="Make a seamless texture of a photo's pattern.")
-@options.photo_and_program
-@options.output("Where to write the picture, the kind by the suffix; - is stdout.")
-@kind_option
-@json_option
-@options.force
+@inputs.words("PHOTO... [PROG]")
+@targets.written(PICTURES, "Where to write the picture.")
 @options.field(TileOptions, "source", "--from", "source", type=click.Choice(SOURCES))
 @click.option("--size", type=SizeType(), metavar="WxH", help=sentence("size"))
 @click.option("--repeat", type=RepeatType(), metavar="NxM", default=(1, 1), help=sentence("repeat"))
@@ -47,23 +43,25 @@ class RepeatType(click.ParamType):
 @options.quiet
 @options.verbose
 @options.error_format
-def command(**given: Any) -> None:
+def command(**given: Any) -> int:
     """Make the smallest rectangle that the pattern of PHOTO repeats in, by the program PROG, into a texture.
 
     Without PROG the program is searched for. Of rings it is the sector of one object, unrolled: the angle to
     the right, the radius down; that wraps from side to side. How well the texture wraps is said on stderr.
     """
-    names = {field.name for field in dataclasses.fields(TileOptions)}
-    asked = TileOptions(**{name: value for name, value in given.items() if name in names})
-    photo, program = given["photo"], given["program"]
-    outputs = Outputs.of(given, inputs=(photo, program))
-    with progress.bar(photo, wanted=not given["quiet"]) as update:
-        found = api.tile(photo, program, asked, progress=update)
-    outputs.say(found.notes, name=photo)
-    outputs.say([found.seam.sentence()], name=photo, kind="info")
-    outputs.write(found.paint() if outputs.picture is not None else None, found.record(), name=photo)
-    if given["verbose"]:
-        record = found.record()
+    asked = options.chosen(TileOptions, given)
+
+    def cut(job: Job) -> batch.Answer:
+        found = api.tile(job.photo, job.program, asked, progress=job.update)
+        shear = found.record()["shear_deg"]
+        skewed = "" if shear is None else f", skewed by {shear:.1f} degrees"
         size = f"{found.size.width} x {found.size.height} px of {len(found.used)} cells"
-        shear = "" if record["shear_deg"] is None else f", skewed by {record['shear_deg']:.1f} degrees"
-        outputs.say([f"{size}{shear}"], name=photo, kind="info")
+        return batch.Answer(
+            make=lambda: made(found.paint(), job.kind),
+            facts=found.record,
+            notes=found.notes,
+            info=[found.seam.sentence()],
+            more=[f"{size}{skewed}"],
+        )
+
+    return each_photo(given, cut)

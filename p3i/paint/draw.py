@@ -91,6 +91,21 @@ class RenderedPicture:
         colours = np.ascontiguousarray(values[:, :, :3])
         return encode(colours, kind=".png", alpha=alpha, text={PNG_KEYWORD: text})
 
+    def record(self) -> dict[str, Any]:
+        """The facts as plain JSON values: the canvas, the camera (degrees, mm), the objects, the program."""
+        seen = np.isfinite(self.centers_px).all(axis=1)
+        return {
+            "size": [self.size.width, self.size.height],
+            "camera": {
+                "rx": self.camera.rx_deg,
+                "ry": self.camera.ry_deg,
+                "focal": self.camera.focal_mm,
+                "focal_from": self.focal_source,
+            },
+            "objects": int(seen.sum()),
+            "program": format_program(self.program),
+        }
+
     def save(self, path: Path_, *, kind: str | None = None, force: bool = False) -> None:
         """Write a file, whole or not at all, its kind by the suffix unless `kind` says; `-` is stdout.
 

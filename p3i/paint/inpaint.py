@@ -56,6 +56,14 @@ class Inpainted:
         alpha = None if alpha is None else np.where(self.hole, np.float32(1), alpha)
         return repainted(self.photo, self.pixels, alpha=alpha)
 
+    def record(self) -> dict[str, Any]:
+        """The facts as plain JSON values."""
+        return {
+            "photo": [self.photo.size.width, self.photo.size.height],
+            "filled": int(self.hole.sum()),
+            "unlike": round(float(self.unlike), 4),
+        }
+
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""
         self.paint().save(path, kind=kind, force=force)

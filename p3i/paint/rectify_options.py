@@ -14,13 +14,7 @@ from p3i.records import PhotoFocal, check_focal
 CROPS = ("pattern", "inside", "all", "same")
 """What of the plane a straightened view shows."""
 
-PICTURE_KINDS = ("png", "jpg", "tiff", "webp")
-"""The pictures that `rectify` and `tile` write."""
-
 _TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
-
-
-"""A record of options."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ TAKES: dict[str, str] = {
     "inpaint": "photo.png PROG --remove 0,0 -o out.png",
     "extend": "photo.png PROG --by 4 -o out.png",
     "edit": "photo.png PROG grid.p3p -o out.png",
-    "points": "PROG --image photo.png -o out.csv",
+    "points": "photo.png PROG -o out.csv",
     "score": "photo.png PROG",
 }
 ON_TEXT = {"check", "fmt", "expand"}
@@ -87,13 +87,14 @@ def test_the_verbs_on_text_read_a_pipe_too(verb: str, folder: Path, monkeypatch:
 )
 def test_standard_input_serves_one_argument(words: str, folder: Path, monkeypatch, capsys) -> None:
     pipe(monkeypatch, LATTICE.encode())
-    assert run([*words.split(), *([] if "-o" in words or "score" in words else ["-o", "out.png"])]) == 2
+    output = [] if "-o" in words else ["-o", "out.json" if words.startswith("score") else "out.png"]
+    assert run([*words.split(), *output]) == 2
     assert "standard input" in unstyle(capsys.readouterr().err)
 
 
 def test_a_mask_from_a_pipe_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     import p3i
-    from p3i.api import pictures
+    from p3i.api import search
     from p3i.search.result import StopReason, SynthesisResult
 
     seen = []
@@ -102,7 +103,7 @@ def test_a_mask_from_a_pipe_is_read_once(folder: Path, monkeypatch: pytest.Monke
         seen.append(photo)
         return SynthesisResult(program=p3i.loads(LATTICE), stop=StopReason.FOUND)
 
-    monkeypatch.setattr(pictures, "synth", found)
+    monkeypatch.setattr(search, "synth", found)
     mask = np.zeros((200, 240, 3), np.uint8)
     mask[90:115, 100:130] = 255
     write_image(folder / "mask.png", mask)
