@@ -12,7 +12,10 @@ from typing import Any, Literal
 import click
 
 from p3i import api, files
+from p3i.carried import read_program
 from p3i.cli import options, progress, report, search_options
+from p3i.cli.batch import exit_code
+from p3i.cli.inputs import INPUT, listed
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.errors import NoPatternError, P3IError, UsageError
 from p3i.records import told
@@ -46,7 +49,7 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 
 
 @click.command("synth", short_help="Find the camera and the program of a photo's pattern.")
-@click.argument("images", metavar="IMAGE...", nargs=-1, required=True)
+@click.argument("images", metavar="PHOTO...", type=INPUT, nargs=-1, required=True)
 @click.option(
     "--format",
     "form",
@@ -58,11 +61,11 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 @options.force
 @options.field(SearchConfig, "structure", metavar="|".join(STRUCTURES))
 @options.field(SearchConfig, "extent", type=click.Choice(EXTENTS))
-@click.option("--sketch", type=click.Path(), metavar="FILE", help=sentence("sketch"))
-@click.option("--start", type=click.Path(), metavar="FILE", help=sentence("start"))
+@click.option("--sketch", type=INPUT, metavar="FILE", help=sentence("sketch"))
+@click.option("--start", type=INPUT, metavar="FILE", help=sentence("start"))
 @options.field(SearchConfig, "recipe", type=click.Choice(RECIPES))
 @click.option("--exhaustive", "exhaustive_s", type=float, metavar="SECONDS", help=sentence("exhaustive_s"))
-@click.option("--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown.")
+@click.option("--mask", type=INPUT, metavar="FILE", help="A picture whose white pixels are unknown.")
 @click.option(
     "--roi",
     metavar="X,Y,W,H|POINTS",
@@ -84,7 +87,7 @@ LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
 @options.verbose
 @options.error_format
 def command(**given: Any) -> int:
-    """Find the camera and the program of the pattern on each IMAGE: a file, a glob or a folder.
+    """Find the camera and the program of the pattern on each PHOTO: a file, a glob, a folder, or @LIST.
 
     Prints the program of a single photo on stdout. Exits with 5 where there is no regular pattern, and
     with 6 where only some of many photos have one. Ctrl-C prints the best program so far.
@@ -119,11 +122,11 @@ class Call:
         chosen = {name: value for name, value in given.items() if name in names}
         if chosen["weights"] is not None:
             chosen["weights"] = Path(chosen["weights"])
-        for name, reader in (("sketch", api.load_sketch), ("start", api.load)):
+        for name, reader in (("sketch", api.load_sketch), ("start", read_program)):
             if chosen[name] is not None:
                 chosen[name] = reader(chosen[name])
         config = SearchConfig(**chosen)
-        photos = tuple(files.gather(given["images"], suffixes=SUFFIXES))
+        photos = tuple(files.gather(listed(given["images"]), suffixes=SUFFIXES))
         output: str | None = given["output"]
         form = given["form"] or ("jsonl" if output and Path(output).suffix == ".jsonl" else "p3p")
         into_folder = output is not None and files.names_folder(output)
@@ -183,7 +186,7 @@ def run(call: Call) -> int:
             codes.append(outcome.code)
             if outcome.code == 130:
                 break
-    return _exit_code(codes)
+    return exit_code(codes)
 
 
 def _targets(call: Call) -> list[Path | None]:
@@ -323,14 +326,6 @@ def _talk(call: Call, outcome: Outcome) -> None:
         found = f"{result.structure} of {len(result.centers)} objects{score}{margin}, {focal}"
         message = f"{name}: {found}, {outcome.seconds:.1f} s"
         report.line(message, as_json=as_json, kind="info", image=name)
-
-
-def _exit_code(codes: list[int]) -> int:
-    """0 if all went well, the common code if all failed alike, else 6; 130 once interrupted."""
-    if 130 in codes:
-        return 130
-    kinds = set(codes)
-    return kinds.pop() if len(kinds) == 1 else 6
 
 
 def _ranked(target: Path, rank: int) -> Path:

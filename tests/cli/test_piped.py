@@ -83,6 +83,9 @@ def test_the_verbs_on_text_read_a_pipe_too(verb: str, folder: Path, monkeypatch:
         "tile - -",
         "extend - -",
         "render - - -o out/",
+        "synth - --mask -",
+        "synth - --start -",
+        "synth photo.png --mask - --start -",
     ],
 )
 def test_standard_input_serves_one_argument(words: str, folder: Path, monkeypatch, capsys) -> None:
@@ -90,6 +93,30 @@ def test_standard_input_serves_one_argument(words: str, folder: Path, monkeypatc
     output = [] if "-o" in words else ["-o", "out.json" if words.startswith("score") else "out.png"]
     assert run([*words.split(), *output]) == 2
     assert "standard input" in unstyle(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("start", ["-", "drawn.png", "drawn.svg"])
+def test_synth_starts_from_a_program_wherever_it_comes_from(
+    start: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from p3i import api, loads
+    from p3i.cli import synth
+    from p3i.search.result import StopReason, SynthesisResult
+
+    asked = []
+
+    def found(photo, config, **_):
+        asked.append(config.start)
+        return SynthesisResult(program=loads(LATTICE), stop=StopReason.FOUND)
+
+    assert run(["render", "grid.p3p", "-q", "-o", "drawn.png"]) == 0
+    assert run(["render", "grid.p3p", "-q", "-o", "drawn.svg"]) == 0
+    monkeypatch.setattr(api, "synth", found)
+    assert synth.api is api
+    pipe(monkeypatch, LATTICE.encode())
+    (folder / "list.txt").write_text("photo.png\n")
+    assert run(["synth", "@list.txt", "--start", start, "-o", "out.p3p"]) == 0
+    assert asked == [loads(LATTICE)]
 
 
 def test_a_mask_from_a_pipe_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
