@@ -76,14 +76,19 @@ class Talk:
     def say(self, sentences: Iterable[str], *, name: str, kind: str = "note") -> None:
         """Say sentences about an input, unless asked to be quiet."""
         for sentence in () if self.quiet else sentences:
-            message = sentence if self.as_json else f"{name}: {sentence}"
+            message = sentence if self.as_json else f"{shown(name)}: {sentence}"
             report.line(message, as_json=self.as_json, kind=kind, image=name)
 
     def refuse(self, sentence: str, *, name: str, code: int) -> int:
         """Say what is wrong with an input; returns the exit code."""
-        message = sentence if self.as_json or name in sentence else f"{name}: {sentence}"
+        message = sentence if self.as_json or shown(name) in sentence else f"{shown(name)}: {sentence}"
         report.line(message, as_json=self.as_json, code=code, image=name)
         return code
+
+
+def shown(name: str) -> str:
+    """An input's name in messages."""
+    return "standard input" if name == STDOUT else name
 
 
 def exit_code(codes: Iterable[int]) -> int:
@@ -104,7 +109,7 @@ def run(inputs: Sequence[str], work: Work, *, to: Targets, talk: Talk) -> int:
         answers = _Stream.of(to.answers, shared=to.answers_in_one, force=to.force, opened=open_files)
         facts = _Stream.of(to.facts, shared=to.facts_in_one, force=to.force, opened=open_files)
         for number, name in enumerate(inputs):
-            label = "standard input" if name == STDOUT else Path(name).name
+            label = Path(shown(name)).name
             if len(inputs) > 1:
                 label = f"{number + 1}/{len(inputs)} {label}"
             code, wrong = 0, ""

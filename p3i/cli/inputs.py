@@ -11,6 +11,7 @@ The rules, for every command:
 """
 
 import glob
+import inspect
 import os
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -45,13 +46,25 @@ class Input(click.Path):
         return super().convert(value, param, ctx)
 
 
-INPUT = Input()
+INPUT = Input(readable=False)  # whether it may be read its reader says
 """The type of every argument and option that names a file to read."""
 
 
 def words(metavar: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The arguments of a command that takes one input or many; they arrive as `words: tuple[str, ...]`."""
-    return click.argument("words", metavar=metavar, type=INPUT, nargs=-1, required=True)
+    """The arguments of a command that takes one input or many; they arrive as `words: tuple[str, ...]`.
+
+    What they may be is added to the command's help.
+    """
+    first = metavar.partition("...")[0]
+    place = "" if first == "PROG" else " Programs come last."
+
+    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
+        rules = f"{first} is a file, a glob, a folder, @LIST (a text file of such names) or - (stdin).{place}"
+        carried = "A program may be its text, or a PNG or SVG that carries it."
+        function.__doc__ = f"{inspect.getdoc(function)}\n\n{rules} {carried}"
+        return click.argument("words", metavar=metavar, type=INPUT, nargs=-1, required=True)(function)
+
+    return declare
 
 
 @dataclass(frozen=True, slots=True)

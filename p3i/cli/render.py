@@ -75,10 +75,10 @@ class SizeType(click.ParamType):
 @options.verbose
 @options.error_format
 def command(**given: Any) -> int:
-    """Draw each program PROG: a file, a glob, a folder, or @LIST.
+    """Draw each program PROG, alone or over a photo.
 
-    PROG may also be a PNG or SVG that was drawn here: both carry their program. Dots are coloured by the
-    loop index i, from red to violet, or in the order of drawing where there is one loop.
+    Dots are coloured by the loop index i, from red to violet, or in the order of drawing where there is one
+    loop.
     """
     asked = options.chosen(RenderOptions, given)
     image, sprite = given["image"], given["sprite"]

@@ -120,6 +120,8 @@ def targets(
     """
     output: str | None = given["output"]
     facts: str | None = given["json_to"]
+    if len(inputs) > 1 and output is not None and not (kinds.lines or _is_folder(output)):
+        raise UsageError(f"{len(inputs)} inputs need -o FOLDER/, with a slash at its end")
     kind = kinds.of(output, given["kind"])
     wanted = output or (None if facts == STDOUT else STDOUT)
     several = len(inputs) > 1

@@ -9,7 +9,10 @@ import pytest
 from click import unstyle
 from marked import LATTICE, drawn
 
+import p3i
+from p3i.api import search
 from p3i.cli.main import COMMANDS, run
+from p3i.search.result import StopReason, SynthesisResult
 from p3i.vision.write import write_image
 
 # What each verb needs beside its photos and the program, and how its files end.
@@ -71,6 +74,29 @@ def test_folders_globs_and_lists_name_photos(verb: str, words: list[str], folder
     assert [each["image"] for each in facts] == ["photos/a.png", "photos/b.png"]
 
 
+def test_without_a_program_that_of_each_photo_is_found(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def found(photo, config=None, **_):
+        asked.append(photo.size)
+        return SynthesisResult(program=p3i.loads(LATTICE), stop=StopReason.FOUND)
+
+    monkeypatch.setattr(search, "synth", found)
+    for verb in VERBS:
+        words = ["grid.p3p"] if verb == "edit" else []
+        target = f"{verb}/"
+        assert run([verb, "photos/", *words, *VERBS[verb][0], "-o", target, "-q"]) == 0
+        assert len(made(folder / target)) == 2
+    assert len(asked) == 2 * len(VERBS)
+
+
+@pytest.mark.parametrize("verb", ALL)
+def test_help_says_what_the_words_may_be(verb: str, capsys) -> None:
+    assert run([verb, "--help"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "is a file, a glob, a folder, @LIST" in shown and "a PNG or SVG that carries it" in shown
+
+
 @pytest.mark.parametrize("verb", VERBS)
 def test_json_on_stdout_is_the_whole_answer_and_quiet_is_quiet(verb: str, folder: Path, capsys) -> None:
     assert run([*call(verb, "photos/a.png"), "--json", "-", "-q"]) == 0
@@ -97,6 +123,13 @@ def test_the_old_order_is_understood_where_the_files_tell(verb: str, folder: Pat
     assert run([verb, "grid.p3p", "photos/a.png", *VERBS[verb][0], "-o", target]) == 0
     assert run([*call(verb, "photos/a.png"), "-o", f"new{target}"]) == 0
     assert (folder / target).read_bytes() == (folder / f"new{target}").read_bytes()
+
+
+@pytest.mark.parametrize("verb", ["check", "fmt"])
+def test_the_verbs_on_text_take_lists_too(verb: str, folder: Path, capsys) -> None:
+    (folder / "programs.txt").write_text("grid.p3p\n")
+    assert run([verb, "@programs.txt"]) == 0
+    assert run([verb, "@gone.txt"]) == 3
 
 
 def test_several_programs_that_fail_alike_exit_as_one_does(folder: Path) -> None:
