@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from PIL import Image as Pil
-from PIL.PngImagePlugin import PngInfo
+from PIL.PngImagePlugin import PngImageFile, PngInfo
 
 import p3i
-from p3i.carried import read_either, read_program
+from p3i.carried import kind_of, read_either, read_program
 from p3i.errors import FileError, ProgramError
 from p3i.vision.image import Image
 from p3i.vision.write import write_image
@@ -49,9 +49,12 @@ def test_a_drawing_saved_anew_by_another_program_keeps_its_program(drawn: Path, 
     data = buffer.getvalue()
     if packed == "text after the pixels":
         at = data.index(b"tEXt") - 4
-        length = 12 + int.from_bytes(data[at : at + 4], "big")
-        chunk, rest = data[at : at + length], data[:at] + data[at + length :]
-        data = rest[:-12] + chunk + rest[-12:]
+        chunk = data[at : at + 12 + int.from_bytes(data[at : at + 4], "big")]
+        note = io.BytesIO()
+        others = PngInfo()
+        others.add_text("Software", "a painter")
+        pixels.save(note, "PNG", pnginfo=others)
+        data = note.getvalue()[:-12] + chunk + note.getvalue()[-12:]
     drawn.write_bytes(data)
     assert read_program(drawn) == p3i.loads(TEXT)
 
@@ -66,6 +69,14 @@ def test_a_program_is_read_from_text_svg_and_standard_input(
         data = (tmp_path / name).read_bytes()
         monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(data)))
         assert read_program("-") == p3i.loads(TEXT)
+
+
+def test_a_plain_png_is_told_from_a_drawing_without_decoding_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_image(tmp_path / "photo.png", np.zeros((6, 9, 3), np.uint8), text={"Comment": "a wall"})
+    monkeypatch.setattr(PngImageFile, "load", lambda *_: pytest.fail("decoded"))
+    assert kind_of(tmp_path / "photo.png") == "photo"
 
 
 def test_what_is_read_may_be_a_photo_or_a_program(drawn: Path, tmp_path: Path) -> None:

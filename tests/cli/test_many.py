@@ -36,7 +36,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("photos").mkdir()
     for seed, name in enumerate("ab"):
-        write_image(f"photos/{name}.png", drawn(LATTICE, seed=seed, width=240, height=200).pixels)
+        write_image(f"photos/{name}.png", drawn(LATTICE, seed=seed, width=180, height=150).pixels)
     Path("grid.p3p").write_text(LATTICE)
     Path("text.jpg").write_text("this is no photo\n")
     Path("list.txt").write_text("photos/a.png\nphotos/b.png\n")
