@@ -42,6 +42,14 @@ def test_every_name_that_a_document_uses_can_be_imported(path: Path) -> None:
             value = getattr(value, part)
 
 
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_value_that_a_documented_call_makes_is_exported(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    calls = re.findall(r"`[^`\n]*\bp3i\.\w+\([^`\n]*`", text)
+    for name in {name for call in calls for name in re.findall(r"\b(?<!\.)([A-Z]\w+)\(", call)}:
+        assert name in p3i.__all__, f"{path.name} makes a {name}"
+
+
 @pytest.mark.parametrize("record", RECORDS)
 def test_every_type_that_an_option_may_have_is_exported(record: str) -> None:
     def inside(hint: object) -> set[type]:

@@ -17,7 +17,7 @@ import click
 from p3i import files
 from p3i.cli import progress, report
 from p3i.cli.targets import STDOUT, Targets
-from p3i.errors import P3IError
+from p3i.errors import FileError, P3IError
 
 Update = Callable[[str, float], None]
 
@@ -135,9 +135,12 @@ def run(inputs: Sequence[str], work: Work, *, to: Targets, talk: Talk) -> int:
                 code = talk.refuse("interrupted", name=name, code=INTERRUPTED)
             except P3IError as error:
                 wrong, code = str(error), _refused(error, name=name, talk=talk)
+            except OSError as error:  # what the system refuses where nobody foresaw it
+                wrong = (error.strerror or str(error)).lower()
+                code = talk.refuse(wrong, name=name, code=FileError.exit_code)
             except MemoryError:
                 wrong = "not enough memory for this picture; scale it down"
-                code = talk.refuse(wrong, name=name, code=3)
+                code = talk.refuse(wrong, name=name, code=FileError.exit_code)
             except Exception as error:
                 wrong, code = report.bug_sentence(error), report.bug(error, as_json=talk.as_json)
             if wrong and to.facts_in_one:

@@ -10,6 +10,7 @@
   before the work begins.
 """
 
+import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -182,9 +183,9 @@ def _files(found: Targets) -> list[str]:
 
 def _refuse_clashes(found: Targets, *, taken: Iterable[str | None]) -> None:
     """Raise UsageError for a file that would be written twice, or is read here."""
-    places = [str(Path(place).resolve()) for place in _files(found)]
+    places = [os.path.realpath(place) for place in _files(found)]
     if twice := [place for place, count in Counter(places).items() if count > 1]:
         raise UsageError(f"answer and facts would both be written to {twice[0]}")
-    read = {str(Path(path).resolve()) for path in taken if path is not None and path != STDOUT}
+    read = {os.path.realpath(path) for path in taken if path is not None and path != STDOUT}
     if clash := sorted(read & set(places)):
         raise UsageError(f"{clash[0]} is read here: write to another file")

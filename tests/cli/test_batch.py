@@ -57,6 +57,7 @@ def test_the_exit_code_is_that_of_all_or_6(codes: list[int], code: int) -> None:
         (FileError("gone"), 3),
         (ZeroDivisionError("a bug"), 70),
         (MemoryError(), 3),
+        (OSError(28, "No space left on device"), 3),
         (RecursionError(), 70),
     ],
     ids=lambda value: type(value).__name__,
