@@ -6,9 +6,12 @@ ends the call, and what was written stays.
 
 import dataclasses
 import json
+import os
 import re
+import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -105,51 +108,62 @@ def exit_code(codes: Iterable[int]) -> int:
 def run(inputs: Sequence[str], work: Work, *, to: Targets, talk: Talk) -> int:
     """Work through the inputs in order, write each answer as soon as it is known, return the exit code."""
     codes: list[int] = []
-    with ExitStack() as open_files:
-        answers = _Stream.of(to.answers, shared=to.answers_in_one, force=to.force, opened=open_files)
-        facts = _Stream.of(to.facts, shared=to.facts_in_one, force=to.force, opened=open_files)
-        for number, name in enumerate(inputs):
+    with ExitStack() as opened:
+        answers = _Stream.of(to.answers, shared=to.answers_in_one, force=to.force, opened=opened)
+        facts = _Stream.of(to.facts, shared=to.facts_in_one, force=to.force, opened=opened)
+
+        def finish(number: int) -> int:
+            name, answer_to, facts_to = inputs[number], to.answers[number], to.facts[number]
             label = Path(shown(name)).name
-            if len(inputs) > 1:
-                label = f"{number + 1}/{len(inputs)} {label}"
-            code, wrong = 0, ""
-            try:
-                with progress.bar(label, wanted=not talk.quiet) as update:
-                    answer = work(name, update)
-                    update("writing", 1.0)
-                    made = answer.make() if to.answers[number] is not None else None
-                    record = answer.facts() if to.facts[number] is not None else None
-                talk.say(answer.notes, name=name)
-                if made is not None:
-                    talk.say(made.notes, name=name)
-                    answers.write(to.answers[number], made.data)
-                if record is not None:
-                    facts.write(to.facts[number], _facts(record, name, in_one=to.facts_in_one))
-                talk.say(answer.info, name=name, kind="info")
-                talk.say(answer.more if talk.verbose else (), name=name, kind="info")
-                if code := answer.code:
-                    talk.refuse(answer.refusal, name=name, code=code)
-            except BrokenPipeError:
-                raise
-            except KeyboardInterrupt:
-                code = talk.refuse("interrupted", name=name, code=INTERRUPTED)
-            except P3IError as error:
-                wrong, code = str(error), _refused(error, name=name, talk=talk)
-            except OSError as error:  # what the system refuses where nobody foresaw it
-                wrong = (error.strerror or str(error)).lower()
-                code = talk.refuse(wrong, name=name, code=FileError.exit_code)
-            except MemoryError:
-                wrong = "not enough memory for this picture; scale it down"
-                code = talk.refuse(wrong, name=name, code=FileError.exit_code)
-            except Exception as error:
-                wrong, code = report.bug_sentence(error), report.bug(error, as_json=talk.as_json)
+            label = label if len(inputs) == 1 else f"{number + 1}/{len(inputs)} {label}"
+            with progress.bar(label, wanted=not talk.quiet) as update:
+                answer = work(name, update)
+                update("writing", 1.0)
+                made = None if answer_to is None else answer.make()
+                record = None if facts_to is None else answer.facts()
+            talk.say(answer.notes, name=name)
+            if made is not None:
+                talk.say(made.notes, name=name)
+                answers.write(answer_to, made.data)
+            if record is not None:
+                facts.write(facts_to, _facts(record, name, in_one=to.facts_in_one))
+            talk.say((*answer.info, *(answer.more if talk.verbose else ())), name=name, kind="info")
+            return talk.refuse(answer.refusal, name=name, code=answer.code) if answer.code else 0
+
+        for number, name in enumerate(inputs):
+            code, wrong = guarded(partial(finish, number), name=name, talk=talk)
             if wrong and to.facts_in_one:
-                failure = {"error": wrong, "code": code}
-                facts.write(to.facts[number], _facts(failure, name, in_one=True))
+                facts.write(to.facts[number], _facts({"error": wrong, "code": code}, name, in_one=True))
             codes.append(code)
             if code == INTERRUPTED:
                 break
     return exit_code(codes)
+
+
+def guarded(attempt: Callable[[], int], *, name: str, talk: Talk) -> tuple[int, str]:
+    """The exit code of what is done for one input, and the sentence where it failed, which is said.
+
+    Nothing that goes wrong comes out, but a closed pipe: nobody listens any more.
+    """
+    try:
+        return attempt(), ""
+    except BrokenPipeError:
+        raise
+    except KeyboardInterrupt:
+        return talk.refuse("interrupted", name=name, code=INTERRUPTED), ""
+    except P3IError as error:
+        return _refused(error, name=name, talk=talk), str(error)
+    except OSError as error:  # what the system refuses where nobody foresaw it
+        wrong = (error.strerror or str(error)).lower()
+        return talk.refuse(wrong, name=name, code=FileError.exit_code), wrong
+    except MemoryError:
+        wrong = "not enough memory for this picture; scale it down"
+        return talk.refuse(wrong, name=name, code=FileError.exit_code), wrong
+    except Exception as error:
+        if os.environ.get("P3I_DEBUG"):
+            traceback.print_exception(error)
+        wrong = report.bug_sentence(error)
+        return talk.refuse(wrong, name=name, code=70), wrong
 
 
 def facts_text(facts: Mapping[str, Any]) -> str:
