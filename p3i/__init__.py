@@ -9,6 +9,7 @@ Every name is loaded when it is first used: `p3i.check` and `p3i.format` never i
 """
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     )
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
-    from p3i.grammar.diagnostics import Diagnostic, ParseError
+    from p3i.grammar.diagnostics import Diagnostic
+    from p3i.grammar.parse_error import ParseError
     from p3i.grammar.sketch import Sketch
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
@@ -77,7 +79,7 @@ _HOMES = {
     "P3IError": "p3i.errors",
     "parse_cell": "p3i.paint.rectify_options",
     "parse_margins": "p3i.paint.extend_options",
-    "ParseError": "p3i.grammar.diagnostics",
+    "ParseError": "p3i.grammar.parse_error",
     "points": "p3i.api",
     "PointsOptions": "p3i.paint.points_options",
     "Program": "p3i.grammar.ast",
@@ -111,6 +113,10 @@ __all__ = [  # noqa: RUF022  # in the order of use
     "parse_cell", "Margins", "parse_margins", "P3IError", "UsageError", "FileError", "ProgramError",
     "ParseError", "NoPatternError",
 ]  # fmt: skip
+
+
+if "IPython" in sys.modules:  # a notebook draws what it shows
+    importlib.import_module("p3i.notebook").register(sys.modules["IPython"])
 
 
 def __getattr__(name: str) -> Any:

@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 from p3i.errors import FileError
 from p3i.files import read_bytes
 from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.layout import source_text
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse
 from p3i.marks import PNG_KEYWORD, SVG_TAG
 

@@ -1,5 +1,8 @@
 """The errors that p3i raises on purpose, each with the exit code that the command line gives it."""
 
+from functools import partial
+from typing import Any
+
 
 class P3IError(Exception):
     """Base of every error that p3i raises on purpose; its text is the sentence that a user reads.
@@ -37,6 +40,10 @@ class SketchError(ProgramError):
     def __init__(self, *, place: str, reason: str, mend: str) -> None:
         super().__init__(f"{place}: {reason}; {mend}")
         self.place, self.reason, self.mend = place, reason, mend
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How it goes to another process, where a photo was searched."""
+        return partial(SketchError, place=self.place, reason=self.reason, mend=self.mend), ()
 
 
 class NoPatternError(P3IError):

@@ -5,14 +5,15 @@
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
-from p3i.errors import FileError, P3IError, UsageError
+from p3i import files
+from p3i.errors import P3IError, UsageError
 from p3i.grammar import checker
 from p3i.grammar.ast import Program, Span
-from p3i.grammar.diagnostics import Diagnostic, ParseError, in_order, warning
+from p3i.grammar.diagnostics import Diagnostic, in_order, warning
 from p3i.grammar.layout import most_bytes, source_text
 from p3i.grammar.leaves import comments
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse, parse_with_holes
 from p3i.grammar.printer import Layout, format_program
 from p3i.grammar.sketch import Sketch, format_sketch, parse_sketch, sketch_of
@@ -159,37 +160,13 @@ def expand(source: str | bytes | Program, *, path: str = "<program>") -> list[Po
 
 def read(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a file, as far as a program's text may reach. Raises FileError with a reason."""
-    try:
-        with open(path, "rb") as stream:
-            return stream.read(most_bytes() + 1)
-    except OSError as problem:
-        raise FileError(f"cannot read {os.fspath(path)}: {_reason(problem)}") from problem
+    return files.read_bytes(path, most=most_bytes() + 1, cut=True)
 
 
 def write(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` beside `path`, then rename, so that no file is ever half written; permissions stay.
-
-    A link is followed: what it points to is replaced, the link stays. Raises FileError.
-    """
-    target = Path(os.path.realpath(path))
-    beside = target.with_name(f".{target.name}.{os.getpid()}.p3i")
-    try:
-        mode = target.stat().st_mode if target.exists() else None
-        if target.exists() and not os.access(target, os.W_OK):
-            raise FileError(f"cannot write {os.fspath(path)}: permission denied")
-        try:
-            beside.write_text(text, encoding="utf-8", newline="\n")
-            if mode is not None:
-                beside.chmod(mode & 0o7777)
-            beside.replace(target)
-        finally:
-            beside.unlink(missing_ok=True)
-    except OSError as problem:
-        raise FileError(f"cannot write {os.fspath(path)}: {_reason(problem)}") from problem
-
-
-def _reason(problem: OSError) -> str:
-    return (problem.strerror or str(problem)).lower()
+    """Write `text` to `path`, whole or not at all, over what is there. Raises FileError."""
+    with files.replacing(path, force=True) as stream:
+        stream.write(text)
 
 
 def _format_sketch(sketch: Sketch, layout: Layout) -> str:

@@ -1,11 +1,11 @@
 """What notebooks show of a program and of an answer: the text, and a drawing in the page itself.
 
-`Program._repr_html_` and `SynthesisResult._repr_html_` look this module up by its name when a notebook asks:
-neither the grammar nor the search knows who draws. Nothing heavy is loaded before that.
+Where p3i is imported in IPython it tells IPython's formatter of the two (`register`): neither the grammar nor
+the search knows who draws. Nothing heavy is loaded before there is something to show.
 """
 
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from p3i.errors import P3IError
 from p3i.grammar.ast import Program
@@ -17,6 +17,16 @@ if TYPE_CHECKING:
 _MOST_DRAWN = 2000
 """Programs of more draws than this are shown as text: the drawing would weigh more than the notebook."""
 _WIDE_PX = 420
+
+
+def register(ipython: Any) -> None:
+    """Let the running shell of the module `ipython`, if there is one, show programs and answers as HTML."""
+    shell = getattr(ipython, "get_ipython", lambda: None)()
+    formatter = getattr(shell, "display_formatter", None)
+    html = getattr(formatter, "formatters", {}).get("text/html")
+    if html is not None:  # a plain terminal has none
+        html.for_type(Program, program_html)
+        html.for_type_by_name("p3i.search.result", "SynthesisResult", result_html)
 
 
 def program_html(program: Program) -> str:

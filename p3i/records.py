@@ -1,23 +1,65 @@
 """Records of options, as the Python API and the command line both read them: a leaf, free of heavy imports.
 
 A record is a frozen dataclass whose fields are Annotated with the sentence that documents them, so `--help`
-and `help(...)` cannot differ.
+and `help(...)` cannot differ. Name, type, default and sentence of a field are all that the command line needs
+(`p3i.cli.options.of`); where it spells a field otherwise, a `Spelt` stands beside the sentence.
 """
 
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 from p3i.errors import UsageError
 
 Record = TypeVar("Record")
 
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Spelt:
+    """How the command line spells a field, where that does not follow from its name and type.
+
+    `flags` as click declares them: "--from", or "--even-light/--keep-light"; empty means by the field's name.
+    `metavar` stands for the value in `--help`. `read` makes the value of its text, and raises UsageError or
+    ValueError: for types that the command line does not know by itself. `none` is a word that means None.
+    """
+
+    flags: str = ""
+    metavar: str | None = None
+    read: Callable[[str], Any] | None = None
+    none: str | None = None
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a record of options: its type without the Annotated, its default, what documents it."""
+
+    name: str
+    kind: Any
+    default: Any
+    sentence: str
+    spelt: Spelt
+
+
 PhotoFocal = Annotated[
     float | None,
     "35 mm-equivalent focal length; by default that of the program's header, else of the photo, else 35.",
+    Spelt("--focal", metavar="MM"),
 ]
 """The field `focal_mm` of every record for a program on its photo."""
+
+
+@cache
+def fields_of(record: type) -> Mapping[str, Field]:
+    """The documented fields of a record by name, in its order."""
+    hints = get_type_hints(record, include_extras=True)
+    found = {}
+    for field in dataclasses.fields(record):
+        sentence, *more = hints[field.name].__metadata__
+        spelt = next((one for one in more if isinstance(one, Spelt)), Spelt())
+        found[field.name] = Field(field.name, hints[field.name].__origin__, field.default, sentence, spelt)
+    return found
 
 
 def told(record: type) -> tuple[Callable[[str], str], Callable[[str], Any]]:
@@ -27,10 +69,10 @@ def told(record: type) -> tuple[Callable[[str], str], Callable[[str], Any]]:
     """
 
     def sentence(name: str) -> str:
-        return get_type_hints(record, include_extras=True)[name].__metadata__[0]
+        return fields_of(record)[name].sentence
 
     def default(name: str) -> Any:
-        return {field.name: field.default for field in dataclasses.fields(record)}[name]
+        return fields_of(record)[name].default
 
     return sentence, default
 

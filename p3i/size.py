@@ -1,5 +1,6 @@
 """The size of a canvas, and the program unit that follows from it."""
 
+import re
 from dataclasses import dataclass
 
 
@@ -32,3 +33,11 @@ class Size:
     def middle(self) -> tuple[float, float]:
         """The principal point (x, y), in pixels."""
         return (self.width - 1) / 2, (self.height - 1) / 2
+
+
+def parse_size(text: str) -> Size:
+    """The size that `WxH` spells, such as 640x480; raises ValueError for anything else."""
+    found = re.fullmatch(r"\s*(\d{1,18})\s*[xX×*,]\s*(\d{1,18})\s*", text)  # noqa: RUF001
+    if found is None or not (int(found[1]) and int(found[2])):
+        raise ValueError(f"{text!r} is no size: write the width and the height in pixels, as in 640x480")
+    return Size(int(found[1]), int(found[2]))

@@ -13,6 +13,41 @@ numbers = st.one_of(
 )
 tame_numbers = st.one_of(st.integers(-20, 20).map(float), st.floats(-50, 50).map(lambda x: round(x, 3) + 0.0))
 
+reaching_numbers = st.one_of(
+    tame_numbers,
+    st.builds(lambda head, power: head * 10.0**power, st.floats(-9.9, 9.9), st.integers(-320, 307)),
+)
+"""Any size between the least and the greatest double: what two numbers in range make may leave it."""
+
+_values = st.recursive(
+    st.one_of(
+        st.builds(
+            lambda sign, digit, count: f"{sign}{digit * count}",
+            st.sampled_from(["", "-"]),
+            st.sampled_from("19"),
+            st.sampled_from([1, 4, 7, 30, 308, 309, 310, 4300, 4301]),
+        ),
+        st.sampled_from(["0x" + "f" * 300, "1e308", "1e309", "-0.0", "5e-324", "inf", "nan", "true", '""']),
+        st.sampled_from(["1979-05-27", "07:32:00", "'a\\b'", '"\\u0000"', '"\\ud800"', "1_0"]),
+        st.integers().map(str),
+        st.floats().map(repr),
+    ),
+    lambda inner: st.lists(inner, max_size=3).map(lambda some: f"[{', '.join(some)}]"),
+    max_leaves=4,
+)
+
+
+@st.composite
+def header_texts(draw: st.DrawFn) -> str:
+    """A header block that is TOML, or nearly: known keys and others, with values of any kind and size."""
+    keys = st.sampled_from(["version", "canvas", "focal", "lens_k1", "image", "fit", "fit.score", "other"])
+    lines = [f"# {key} = {draw(_values)}\n" for key in draw(st.lists(keys, max_size=5))]
+    table = "# [fit]\n" + "".join(
+        f"# {draw(keys)} = {draw(_values)}\n" for _ in range(draw(st.integers(0, 2)))
+    )
+    return "# /// p3p\n" + "".join(lines) + draw(st.sampled_from(["", table])) + "# ///\n"
+
+
 _comment_characters = st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\u2028\u2029")
 comments = st.lists(
     st.text(_comment_characters, max_size=12)

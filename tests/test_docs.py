@@ -47,7 +47,22 @@ def test_every_exit_code_stands_in_the_documents() -> None:
     classes = [value for value in vars(errors).values() if isinstance(value, type)]
     codes = {kind.exit_code for kind in classes if issubclass(kind, errors.P3IError)}
     listed = set(map(int, re.findall(r"^\| (\d+) \|", TEXT[ROOT / "README.md"], flags=re.MULTILINE)))
-    assert codes | {0, 1, 6, 70, 130} <= listed
+    assert codes | {0, 1, 6, 70, 130, 141, 143} <= listed
+
+
+def test_the_readme_names_the_function_of_every_command_that_is_called_otherwise() -> None:
+    import p3i
+
+    said = re.search(
+        r"functions of the same name, except (.*?)\)\.", TEXT[ROOT / "README.md"], flags=re.DOTALL
+    )
+    assert said is not None
+    otherwise = dict(re.findall(r"`(\w+)` is `p3i\.(\w+)`", TEXT[ROOT / "README.md"]))
+    for name in COMMANDS:
+        if name in said[1] and name not in otherwise:
+            assert not hasattr(p3i, name)
+        else:
+            assert callable(getattr(p3i, otherwise.get(name, name)))
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))

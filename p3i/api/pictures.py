@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from p3i import files
 from p3i.api.search import Progress, photo_and_program, read_image, without
 from p3i.carried import read_either, read_program
 from p3i.errors import UsageError
@@ -244,4 +245,4 @@ def _file_name(photo: object) -> str | None:
     """The last part of a photo's path; None where it has none."""
     if not isinstance(photo, str | os.PathLike) or os.fspath(photo) == "-":
         return None
-    return Path(photo).name
+    return files.as_text(Path(photo).name)

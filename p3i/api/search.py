@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from p3i import files
 from p3i.api.refusal import refuses_unknown
 from p3i.carried import read_program
 from p3i.errors import NoPatternError, UsageError
@@ -131,7 +132,7 @@ def trace(trace: str | os.PathLike[str], *, image: str | os.PathLike[str] | None
     """
     from p3i.paint.film import film_of
 
-    return film_of(Path(trace), image=None if image is None else os.fspath(image))
+    return film_of(files.named(trace), image=None if image is None else os.fspath(image))
 
 
 def eval_set(
@@ -154,9 +155,9 @@ def eval_set(
     from p3i.evaluation.score_set import score_set
 
     return score_set(
-        Path(folder),
+        files.named(folder),
         asked,
-        results=None if results is None else Path(results),
+        results=None if results is None else files.named(results),
         jobs=jobs,
         only=only,
         limit=limit,
@@ -185,7 +186,7 @@ def examples(
     from p3i.evaluation.example_set import write_examples
 
     return write_examples(
-        Path(folder),
+        files.named(folder),
         {"lattice": lattices, "circular": rings, "hybrid": hybrids},
         seed=seed,
         focals=focals,
@@ -227,7 +228,8 @@ def without(
 def _relative(photo: str | os.PathLike[str], folder: Path) -> str | None:
     """The photo's path as seen from `folder`, with slashes; None for standard input.
 
-    Absolute only where no relative path exists, None too where its bytes are no text.
+    Absolute only where no relative path exists, None too where its bytes are no text, or
+    the working folder is gone.
     """
     if os.fspath(photo) == "-":
         return None
@@ -235,6 +237,8 @@ def _relative(photo: str | os.PathLike[str], folder: Path) -> str | None:
         name = Path(os.path.relpath(photo, folder)).as_posix()
     except ValueError:  # another drive of Windows
         name = Path(photo).absolute().as_posix()
+    except OSError:  # the working folder is gone
+        return None
     return name if name.isprintable() else None
 
 

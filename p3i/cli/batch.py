@@ -143,11 +143,12 @@ def run(inputs: Sequence[str], work: Work, *, to: Targets, talk: Talk) -> int:
 def guarded(attempt: Callable[[], int], *, name: str, talk: Talk) -> tuple[int, str]:
     """The exit code of what is done for one input, and the sentence where it failed, which is said.
 
-    Nothing that goes wrong comes out, but a closed pipe: nobody listens any more.
+    Nothing that goes wrong comes out, but a standard output that takes no more: no later answer would fare
+    better.
     """
     try:
         return attempt(), ""
-    except BrokenPipeError:
+    except BrokenPipeError:  # OutputError too
         raise
     except KeyboardInterrupt:
         return talk.refuse("interrupted", name=name, code=INTERRUPTED), ""
@@ -182,7 +183,7 @@ def _facts(record: Mapping[str, Any], name: str, *, in_one: bool) -> bytes:
 
 
 def _refused(error: P3IError, *, name: str, talk: Talk) -> int:
-    from p3i.grammar.diagnostics import ParseError  # read here, so that `--help` does not
+    from p3i.grammar.parse_error import ParseError  # read here, so that `--help` does not
 
     if isinstance(error, ParseError):
         return report.p3i_error(error, as_json=talk.as_json)
@@ -212,6 +213,4 @@ class _Stream:
         elif place == STDOUT:
             click.echo(data, nl=False)
         elif place is not None:
-            from p3i.vision.write import write_bytes
-
-            write_bytes(place, data, force=self.force)
+            files.write_bytes(place, data, force=self.force)

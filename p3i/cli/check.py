@@ -5,14 +5,14 @@ import sys
 import click
 
 from p3i import language
-from p3i.cli import options, programs
+from p3i.cli import grouped, options, programs
 from p3i.cli.inputs import INPUT
 from p3i.errors import P3IError
 from p3i.grammar.layout import source_text
 from p3i.grammar.report import report_human, report_json, summary
 
 
-@click.command("check", short_help="Report what is wrong, or odd, in programs.")
+@grouped.command("check")
 @click.argument("files", metavar="FILE...", type=INPUT, nargs=-1, required=True)
 @click.option("--strict", is_flag=True, help="Hold the programs to Table 1 of the paper, to the letter.")
 @options.quiet

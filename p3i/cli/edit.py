@@ -2,25 +2,19 @@
 
 from typing import Any
 
-import click
-
 from p3i import api
 from p3i.carried import read_program
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.inputs import photos_and_programs
 from p3i.cli.pictures import PICTURES, made, prepared
 from p3i.errors import UsageError
-from p3i.paint.edit_options import EditOptions, parse_scale
-from p3i.records import told
-
-sentence, _ = told(EditOptions)
+from p3i.paint.edit_options import EditOptions
 
 
-@click.command("edit", short_help="Lay a photo's objects anew by a changed program.")
+@grouped.command("edit")
 @inputs.words("PHOTO... [OLD] NEW")
+@grouped.group("The objects", options.of(EditOptions))
 @targets.written(PICTURES, "Where to write the picture.")
-@click.option("--scale", metavar="auto|S", default="auto", help=sentence("scale"))
-@options.focal(EditOptions)
 @options.quiet
 @options.verbose
 @options.error_format
@@ -31,7 +25,7 @@ def command(**given: Any) -> int:
     are put where NEW draws. NEW is seen by OLD's camera unless it names its own. Without OLD it is searched
     for.
     """
-    asked = EditOptions(scale=parse_scale(given["scale"]), focal_mm=given["focal_mm"])
+    asked = options.chosen(EditOptions, given)
     found = photos_and_programs(given["words"], most=2)
     if not found.programs:
         raise UsageError("the last word is no program: name the photo, its program, and the new one")

@@ -8,12 +8,8 @@ from typing import Any
 import click
 
 from p3i import api, files
-from p3i.cli import options, progress, search_options
-from p3i.cli.synth import FOCAL
-from p3i.records import told
-from p3i.search.config import EXTENTS, STRUCTURES, SearchConfig
-
-sentence, default = told(SearchConfig)
+from p3i.cli import grouped, options, progress
+from p3i.search.config import SearchConfig
 
 # The columns of the two tables: a key of the row or of the summary, its heading, how its value is printed.
 _PHOTO = (
@@ -31,29 +27,29 @@ _GROUP = (
 )  # fmt: skip
 
 
-@click.command("eval", short_help="Measure p3i on an annotated set of photos.")
+@grouped.command("eval")
 @click.argument("folder", metavar="SET", type=click.Path())
-@click.option("--results", type=click.Path(), metavar="FILE", help="Score these JSON lines; search nothing.")
-@click.option("--out", type=click.Path(), metavar="FILE", help="Write all numbers as JSON.")
-@options.force
-@click.option("--jobs", type=int, metavar="N", default=1, show_default=True, help="Processes to search in.")
-@click.option("--only", metavar="TEXT", help="Only photos whose name contains this.")
-@click.option("--limit", type=int, metavar="N", help="Only the first N photos.")
-@click.option("--structure", metavar="|".join(STRUCTURES), default="auto", help=sentence("structure"))
-@click.option(
-    "--extent",
-    type=click.Choice(EXTENTS),
-    default=default("extent"),
-    help=sentence("extent"),
+@grouped.group(
+    "What to score",
+    click.option(
+        "--results", type=click.Path(), metavar="FILE", help="Score these JSON lines; search nothing."
+    ),
+    click.option("--only", metavar="TEXT", help="Only photos whose name contains this."),
+    click.option("--limit", type=int, metavar="N", help="Only the first N photos."),
 )
-@click.option("--focal", "focal_mm", type=FOCAL, metavar=FOCAL.name, help=sentence("focal_mm"))
-@search_options.features
-@search_options.weights
-@click.option("--strict", is_flag=True, help=sentence("strict"))
-@click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@options.field(SearchConfig, "seed", type=int)
-@search_options.device
-@search_options.threads
+@grouped.group(
+    "Output",
+    click.option("--out", type=click.Path(), metavar="FILE", help="Write all numbers as JSON."),
+    options.force,
+)
+@grouped.group(
+    "The search",
+    options.of(SearchConfig, "structure", "extent", "focal_mm", "features", "weights"),
+    options.of(SearchConfig, "strict", "time_s", "seed", "threads"),
+    click.option(
+        "--jobs", type=int, metavar="N", default=1, show_default=True, help="Processes to search in."
+    ),
+)
 @options.quiet
 @options.error_format
 def command(
@@ -65,10 +61,9 @@ def command(
     jobs: int,
     only: str | None,
     limit: int | None,
-    weights: str | None,
     quiet: bool,
     error_format: str,
-    **chosen: Any,
+    **given: Any,
 ) -> None:
     """Search each photo of the annotated set in the folder SET, and say how far the answers lie from truth.
 
@@ -76,7 +71,7 @@ def command(
     measures, f1 counts objects found within a quarter of their spacing, f1 free after the best shift or
     turn, index is the size of the cell in true cells. `p3i examples` makes such a set.
     """
-    config = SearchConfig(weights=Path(weights) if weights else None, **chosen)
+    config = options.chosen(SearchConfig, given)
     if out is not None:
         files.check_writable(Path(out), force=force)
     with progress.bar("eval", wanted=not quiet) as update:

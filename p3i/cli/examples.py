@@ -3,10 +3,10 @@
 import click
 
 from p3i import api
-from p3i.cli import options, progress
+from p3i.cli import grouped, options, progress
 
 
-@click.command("examples", short_help="Draw scenes whose program is known, as a set to measure with.")
+@grouped.command("examples")
 @click.argument("folder", metavar="DIR")
 @click.option(
     "--seed", type=int, default=0, show_default=True, help="Which set; equal seeds give equal files."

@@ -5,13 +5,13 @@ import json
 import click
 
 from p3i import language
-from p3i.cli import options, programs
-from p3i.grammar.diagnostics import ParseError
+from p3i.cli import grouped, options, programs
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import number_text
 from p3i.interp.unroll import Point
 
 
-@click.command("expand", short_help="List the objects that a program draws.")
+@grouped.command("expand")
 @click.argument("file", metavar="FILE")
 @click.option(
     "--format",

@@ -1,28 +1,31 @@
 """`p3i extend`: photos in, larger pictures out, continued by their programs."""
 
+from functools import partial
 from typing import Any
 
 import click
 
 from p3i import api
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made
 from p3i.errors import UsageError
-from p3i.paint.extend_options import ExtendOptions, parse_margins
-from p3i.records import told
-
-sentence, default = told(ExtendOptions)
+from p3i.paint.extend_options import ExtendOptions, Margins, parse_margins
 
 
-@click.command("extend", short_help="Continue a photo beyond its frame by its pattern.")
+@grouped.command("extend")
 @inputs.words("PHOTO... [PROG]")
-@targets.written(PICTURES, "Where to write the picture.")
-@click.option("--by", metavar="N%|N|L,T,R,B", help=sentence("by"))
-@click.option(
-    "--cells", metavar="N|L,T,R,B", help="How many more cells to each side, counted at the sides' middles."
+@grouped.group(
+    "How far",
+    options.of(ExtendOptions, "by", by={"default": None}),  # None tells that it was not given
+    click.option(
+        "--cells",
+        type=options.Value(partial(parse_margins, option="--cells"), "N|L,T,R,B"),
+        metavar="N|L,T,R,B",
+        help="How many more cells to each side, counted at the sides' middles.",
+    ),
+    options.of(ExtendOptions, "max_px", "focal_mm"),
 )
-@options.max_px(ExtendOptions)
-@options.focal(ExtendOptions)
+@targets.written(PICTURES, "Where to write the picture.")
 @options.quiet
 @options.verbose
 @options.error_format
@@ -34,10 +37,7 @@ def command(**given: Any) -> int:
     """
     if given["by"] is not None and given["cells"] is not None:
         raise UsageError("--by and --cells both say how far: give one of them")
-    by = default("by")
-    for option in ("by", "cells"):
-        if given[option] is not None:
-            by = parse_margins(given[option], option=f"--{option}")
+    by: Margins = given["by"] or given["cells"] or ExtendOptions().by
     asked = options.chosen(ExtendOptions, given, by=by)
 
     def widen(job: Job) -> batch.Answer:

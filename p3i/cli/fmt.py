@@ -5,15 +5,15 @@ import difflib
 import click
 
 from p3i import language
-from p3i.cli import options, programs, report
+from p3i.cli import grouped, options, programs, report
 from p3i.cli.inputs import INPUT
 from p3i.errors import P3IError, UsageError
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.layout import source_text
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import Layout
 
 
-@click.command("fmt", short_help="Rewrite programs in their canonical text.")
+@grouped.command("fmt")
 @click.argument("files", metavar="FILE...", type=INPUT, nargs=-1, required=True)
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; exit 1 if a file would change.")
 @click.option("--diff", "only_diff", is_flag=True, help="Write nothing; print what would change.")

@@ -1,37 +1,31 @@
 """`p3i inpaint`: photos with a hole in, the photos without it out."""
 
-from pathlib import Path
 from typing import Any
 
 import click
 
 from p3i import api
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made
-from p3i.paint.inpaint_options import METHODS, InpaintOptions
-from p3i.records import told
-
-sentence, default = told(InpaintOptions)
+from p3i.paint.inpaint_options import InpaintOptions
 
 
-@click.command("inpaint", short_help="Fill a hole in a photo by its pattern.")
+@grouped.command("inpaint")
 @inputs.words("PHOTO... [PROG]")
-@targets.written(PICTURES, "Where to write the picture.")
-@click.option("--mask", metavar="FILE", type=inputs.INPUT, help="A picture whose white pixels are filled.")
-@click.option(
-    "--remove",
-    metavar="I,J|NAME",
-    multiple=True,
-    help="Fill the cell of this object, by its indices or by its name in `p3i points`; may be given again.",
+@grouped.group(
+    "The hole",
+    click.option(
+        "--mask", metavar="FILE", type=inputs.INPUT, help="A picture whose white pixels are filled."
+    ),
+    click.option(
+        "--remove",
+        metavar="I,J|NAME",
+        multiple=True,
+        help="Fill the cell of this object, by its indices or its name in `p3i points`; may be given again.",
+    ),
 )
-@options.field(InpaintOptions, "method", type=click.Choice(METHODS))
-@options.field(InpaintOptions, "steps", type=int, metavar="N")
-@click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@click.option("--checkpoint", type=click.Path(), metavar="FILE", help=sentence("checkpoint"))
-@options.field(InpaintOptions, "seed", type=int)
-@options.field(InpaintOptions, "device")
-@options.field(InpaintOptions, "threads", type=int)
-@options.focal(InpaintOptions)
+@grouped.group("How to fill it", options.of(InpaintOptions))
+@targets.written(PICTURES, "Where to write the picture.")
 @options.quiet
 @options.verbose
 @options.error_format
@@ -41,8 +35,7 @@ def command(**given: Any) -> int:
     The hole is what --mask marks and the cells that --remove names; without either it is what is transparent.
     All else stays as it is, to the bit. Without PROG the program is searched for, outside of the hole.
     """
-    checkpoint = None if given["checkpoint"] is None else Path(given["checkpoint"])
-    asked = options.chosen(InpaintOptions, given, checkpoint=checkpoint)
+    asked = options.chosen(InpaintOptions, given)
     mask: str | None = given["mask"]
 
     def fill(job: Job) -> batch.Answer:

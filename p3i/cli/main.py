@@ -3,19 +3,22 @@
 Commands are imported when they are called, so `p3i --help` and `p3i check` start without torch.
 """
 
-import contextlib
 import difflib
 import importlib
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from p3i.cli import report
+from p3i.cli import report, streams
 from p3i.errors import P3IError
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 
 class Entry(NamedTuple):
@@ -42,6 +45,7 @@ COMMANDS: dict[str, Entry] = {
     "score": Entry("p3i.cli.score", "Say how well a program explains a photo."),
     "eval": Entry("p3i.cli.eval", "Measure p3i on an annotated set of photos."),
     "examples": Entry("p3i.cli.examples", "Draw scenes whose program is known, as a set to measure with."),
+    "doctor": Entry("p3i.cli.doctor", "Say what is installed here: for a report of a bug."),
 }
 """In the order of `p3i --help`: the main job first."""
 
@@ -65,7 +69,16 @@ class LazyGroup(click.Group):
             close = difflib.get_close_matches(name, COMMANDS, n=1)
             advice = f"did you mean `p3i {close[0]}`?" if close else "`p3i --help` lists the commands"
             raise click.UsageError(f"there is no command `{name}`; {advice}", ctx)
+        report.refuse_lost_folder()
         return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list["CompletionItem"]:
+        from click.shell_completion import CompletionItem
+
+        # click would import every command for its summary.
+        found = [(name, entry.summary) for name, entry in COMMANDS.items() if name.startswith(incomplete)]
+        items = [CompletionItem(name, help=summary) for name, summary in found]
+        return items + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -84,10 +97,16 @@ def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) ->
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Exit codes: 0 done, 1 fmt --check differs, 2 usage, 3 a file, 4 a program, 5 no pattern, "
-    "6 some of many failed, 70 a bug, 130 interrupted.",
+    "6 some of many failed, 70 a bug, 130 interrupted, 143 ended.",
 )
 @click.option(
-    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Version."
+    "-V",
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version and exit.",
 )
 def cli() -> None:
     """From one slanted photo of a plane with a repeating pattern to the camera's tilt and a short program."""
@@ -96,8 +115,8 @@ def cli() -> None:
 def run(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv` (without the program's name) and return the exit code; never raises.
 
-    P3IError gives its own code, wrong usage 2, an interrupt 130, a closed pipe 141 without a word, and
-    anything unforeseen 70 with one line (P3I_DEBUG=1 shows the traceback).
+    P3IError gives its own code, wrong usage 2, what the system refuses 3, an interrupt 130, a closed pipe 141
+    without a word, and anything unforeseen 70 with one line (P3I_DEBUG=1 shows the traceback).
     """
     words = list(sys.argv[1:] if argv is None else argv)
     as_json = report.wants_json(words)
@@ -113,14 +132,16 @@ def run(argv: Sequence[str] | None = None) -> int:
         return 2
     except click.ClickException as error:
         return report.click_error(error, as_json=as_json)
-    except BrokenPipeError:
-        _silence_stdout()
-        return 141
+    except BrokenPipeError as error:
+        streams.silence_stdout()
+        return report.output_error(error, as_json=as_json) if isinstance(error, streams.OutputError) else 141
     except (KeyboardInterrupt, click.Abort):
         report.line("interrupted", as_json=as_json, code=130)
         return 130
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0 if leaving.code is None else 70
+    except OSError as error:
+        return report.system_error(error, as_json=as_json)
     except Exception as error:
         return report.bug(error, as_json=as_json)
 
@@ -138,10 +159,23 @@ def _invoke(words: list[str]) -> object:
         return leaving.exit_code
 
 
-def _silence_stdout() -> None:
-    """Point stdout at nothing, so that the interpreter's last flush does not complain of the closed pipe."""
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+class Ending:
+    """SIGTERM, and the terminal that hangs up: as an interrupt at first, at once when it comes again.
+
+    So what was found is kept, and what was begun is tidied away. `code` is what the shell then sees.
+    """
+
+    def __init__(self) -> None:
+        self.code: int | None = None
+        for name in ("SIGTERM", "SIGHUP"):
+            if hasattr(signal, name):  # Windows has no SIGHUP
+                signal.signal(getattr(signal, name), self._asked)
+
+    def _asked(self, number: int, _frame: object) -> None:
+        if self.code is not None:
+            sys.exit(self.code)
+        self.code = 128 + number
+        raise KeyboardInterrupt
 
 
 def main() -> None:
@@ -150,7 +184,10 @@ def main() -> None:
         # Libraries warn their programmers, not our users, to whom each answer says what they need to know.
         warnings.simplefilter("ignore")
         os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-    sys.exit(run())
+    streams.secure()
+    ending = Ending()
+    code = run()
+    sys.exit(code if ending.code is None else ending.code)
 
 
 if __name__ == "__main__":

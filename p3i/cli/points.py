@@ -8,16 +8,13 @@ import click
 
 from p3i import api
 from p3i.carried import kind_of, read_program
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.inputs import PROGRAMS, Inputs, files, names_one, photos_and_programs
 from p3i.cli.photos import SUFFIXES
 from p3i.cli.pictures import prepared
-from p3i.cli.render import SizeType
 from p3i.cli.targets import Kinds
 from p3i.paint.points_options import BY_SUFFIX, FORMATS, PointsOptions
-from p3i.records import told
-
-sentence, default = told(PointsOptions)
+from p3i.size import parse_size
 
 UNEXPECTED = 1
 """The exit code where `--expect` does not hold: like `fmt --check`, a check was asked for and it says no."""
@@ -32,49 +29,34 @@ LISTS = Kinds(
 """The lists; COCO and labelme are JSON too and have to be asked for."""
 
 
-@click.command("points", short_help="List the objects: places, names, cells, and whether each is there.")
+@grouped.command("points")
 @inputs.words("PHOTO... [PROG] | PROG...")
+@grouped.group(
+    "The list",
+    click.option(
+        "--image",
+        type=inputs.INPUT,
+        metavar="PHOTO",
+        help="The photo of the program: says which objects are there.",
+    ),
+    options.of(PointsOptions),
+    click.option(
+        "--expect",
+        type=options.Value(parse_size, "CxR"),
+        metavar="CxR",
+        help=f"Exit with {UNEXPECTED} where the listed objects do not stand in C columns and R rows.",
+    ),
+)
+@grouped.group(
+    "Crops",
+    click.option(
+        "--crops", metavar="DIR", help="Write a picture of each object into this folder, by its name."
+    ),
+    click.option(
+        "--straight/--plain", default=True, help="Crops seen straight on, or cut from the photo as it is."
+    ),
+)
 @targets.written(LISTS, "Where to write the list.")
-@click.option(
-    "--image",
-    type=inputs.INPUT,
-    metavar="PHOTO",
-    help="The photo of the program: says which objects are there.",
-)
-@click.option(
-    "--size",
-    type=SizeType(),
-    metavar="WxH",
-    default=default("size"),
-    help=sentence("size"),
-)
-@click.option(
-    "--min-presence",
-    type=float,
-    metavar="P",
-    default=default("min_presence"),
-    help=sentence("min_presence"),
-)
-@click.option(
-    "--all",
-    "outside",
-    is_flag=True,
-    default=default("outside"),
-    help=sentence("outside"),
-)
-@click.option("--clip", is_flag=True, default=default("clip"), help=sentence("clip"))
-@options.field(PointsOptions, "label", metavar="WORD")
-@click.option(
-    "--expect",
-    type=SizeType(),
-    metavar="CxR",
-    help=f"Exit with {UNEXPECTED} where the listed objects do not stand in C columns and R rows.",
-)
-@click.option("--crops", metavar="DIR", help="Write a picture of each object into this folder, by its name.")
-@click.option(
-    "--straight/--plain", default=True, help="Crops seen straight on, or cut from the photo as it is."
-)
-@options.focal(PointsOptions)
 @options.quiet
 @options.verbose
 @options.error_format

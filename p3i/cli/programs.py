@@ -12,8 +12,7 @@ from p3i.cli import report
 from p3i.cli.inputs import listed
 from p3i.errors import P3IError
 from p3i.files import gather
-from p3i.grammar.diagnostics import ParseError
-from p3i.grammar.layout import most_bytes
+from p3i.grammar.parse_error import ParseError
 
 SUFFIXES = frozenset({".p3p"})
 STDIN = "-"
@@ -47,7 +46,7 @@ def read(word: str) -> bytes:
 
 def stdin() -> bytes:
     """Standard input, as far as a program's text may reach."""
-    return sys.stdin.buffer.read(most_bytes() + 1)
+    return language.read(STDIN)
 
 
 def shown(path: str) -> str:

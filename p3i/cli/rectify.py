@@ -5,31 +5,25 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made, stored_anew
 from p3i.errors import UsageError
-from p3i.paint.rectify_options import CROPS, RectifyOptions, parse_cell
-from p3i.records import told
-
-sentence, default = told(RectifyOptions)
+from p3i.paint.rectify_options import RectifyOptions
 
 
-@click.command("rectify", short_help="Straighten a photo by its program.")
+@grouped.command("rectify")
 @inputs.words("PHOTO... [PROG]")
-@targets.written(PICTURES, "Where to write the picture.")
-@options.field(RectifyOptions, "crop", type=click.Choice(CROPS))
-@click.option("--scale", type=float, metavar="S", help=sentence("scale"))
-@options.max_px(RectifyOptions)
-@click.option("--cell", metavar="WxHmm", help=sentence("cell"))
-@options.field(RectifyOptions, "upright", "--upright/--as-seen")
-@options.focal(RectifyOptions)
-@click.option(
-    "--back",
-    metavar="EDITED",
-    type=inputs.INPUT,
-    help="Write the photo instead, with what was edited in this picture of the same view.",
+@grouped.group(
+    "The view",
+    options.of(RectifyOptions),
+    click.option(
+        "--back",
+        metavar="EDITED",
+        type=inputs.INPUT,
+        help="Write the photo instead, with what was edited in this picture of the same view.",
+    ),
 )
-@click.option("--tolerance", type=float, metavar="T", help=sentence("tolerance"))
+@targets.written(PICTURES, "Where to write the picture.")
 @options.quiet
 @options.verbose
 @options.error_format
@@ -39,8 +33,7 @@ def command(**given: Any) -> int:
     With --back an edited view goes back into the photo: use the options that the view was made with. What was
     not edited stays as it is, to the bit.
     """
-    cell = None if given["cell"] is None else parse_cell(given["cell"])
-    asked = options.chosen(RectifyOptions, given, cell=cell)
+    asked = options.chosen(RectifyOptions, given)
     edited: str | None = given["back"]
     if asked.tolerance is not None and edited is None:
         raise UsageError("--tolerance belongs to --back")

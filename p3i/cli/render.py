@@ -1,6 +1,5 @@
 """`p3i render`: programs in, pictures out."""
 
-import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -10,66 +9,29 @@ from typing import Any, NoReturn
 import click
 
 from p3i import api
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.inputs import PROGRAMS, files
 from p3i.cli.pictures import DRAWINGS, drawn
 from p3i.errors import UsageError
 from p3i.paint.options import RenderOptions
-from p3i.records import told
-from p3i.size import Size
-
-sentence, default = told(RenderOptions)
 
 _POLL_S = 0.2
 
 
-class SizeType(click.ParamType):
-    """`WxH` in pixels, such as 640x480."""
-
-    name = "WxH"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Size:
-        if isinstance(value, Size):
-            return value
-        found = re.fullmatch(r"\s*(\d{1,18})\s*[xX×*,]\s*(\d{1,18})\s*", str(value))  # noqa: RUF001
-        if found is None or not (int(found[1]) and int(found[2])):
-            self.fail(f"{value!r} is no size: write the width and the height in pixels, as in 640x480")
-        return Size(int(found[1]), int(found[2]))
-
-
-@click.command("render", short_help="Draw a program as PNG, SVG or PDF, also over its photo.")
+@grouped.command("render")
 @inputs.words("PROG...")
+@grouped.group(
+    "What to draw",
+    click.option("--image", type=inputs.INPUT, metavar="PHOTO", help="Draw over this photo."),
+    click.option(
+        "--sprite",
+        type=inputs.INPUT,
+        metavar="FILE",
+        help="A picture to stand at each object, warped by the camera.",
+    ),
+    options.of(RenderOptions),
+)
 @targets.written(DRAWINGS, "Where to draw.")
-@click.option("--image", type=inputs.INPUT, metavar="PHOTO", help="Draw over this photo.")
-@click.option(
-    "--sprite",
-    type=inputs.INPUT,
-    metavar="FILE",
-    help="A picture to stand at each object, warped by the camera.",
-)
-@click.option("--sprite-units", type=float, metavar="U", help=sentence("sprite_units"))
-@click.option(
-    "--size",
-    type=SizeType(),
-    metavar="WxH",
-    default=default("size"),
-    help=sentence("size"),
-)
-@click.option("--plane", is_flag=True, default=default("plane"), help=sentence("plane"))
-@click.option(
-    "--markers/--no-markers",
-    default=default("markers"),
-    help=sentence("markers"),
-)
-@click.option("--cells/--no-cells", default=default("cells"), help=sentence("cells"))
-@click.option(
-    "--horizon",
-    is_flag=True,
-    default=default("horizon"),
-    help=sentence("horizon"),
-)
-@options.focal(RenderOptions)
-@options.max_px(RenderOptions)
 @click.option("--watch", is_flag=True, help="Draw again whenever a file that was read changes, until Ctrl-C.")
 @options.quiet
 @options.verbose

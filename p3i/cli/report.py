@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import click
 
-from p3i.errors import P3IError
+from p3i.errors import FileError, P3IError
 
 
 def wants_json(words: Sequence[str]) -> bool:
@@ -60,7 +60,7 @@ def p3i_error(error: P3IError, *, as_json: bool = False) -> int:
 
     It is one line, save for a program's text with errors, which is shown with all of them, as by `check`.
     """
-    from p3i.grammar.diagnostics import ParseError  # read here, so that `--help` does not
+    from p3i.grammar.parse_error import ParseError  # read here, so that `--help` does not
 
     if isinstance(error, ParseError):
         click.echo(error.report(as_json=as_json, color=coloured()), nl=False, err=True, color=coloured())
@@ -78,6 +78,33 @@ def click_error(error: click.ClickException, *, as_json: bool = False) -> int:
         message = f"{message.rstrip('.')} (`{context.command_path} --help` shows the usage)"
     line(message, as_json=as_json, code=code)
     return code
+
+
+def system_error(error: OSError, *, as_json: bool = False) -> int:
+    """Report what the system refused where nobody foresaw it; returns 3. P3I_DEBUG=1 adds the traceback."""
+    if os.environ.get("P3I_DEBUG"):
+        traceback.print_exception(error)
+    line(_system_sentence(error), as_json=as_json, code=FileError.exit_code)
+    return FileError.exit_code
+
+
+def output_error(error: OSError, *, as_json: bool = False) -> int:
+    """Report that standard output cannot be written to; returns 3."""
+    line(str(error), as_json=as_json, code=FileError.exit_code)
+    return FileError.exit_code
+
+
+def _system_sentence(error: OSError) -> str:
+    name = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+    return f"{name}{(error.strerror or str(error)).lower()}"
+
+
+def refuse_lost_folder() -> None:
+    """Raise FileError where the working folder has been deleted: libraries end the process over that."""
+    try:
+        os.getcwd()
+    except OSError:
+        raise FileError("the working folder is gone: change to one that exists") from None
 
 
 def bug(error: BaseException, *, as_json: bool = False) -> int:

@@ -1,13 +1,12 @@
 """`p3i score`: how well programs explain photos."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import click
 
 from p3i import api
-from p3i.cli import batch, inputs, options, search_options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import Job, each_photo
 from p3i.cli.targets import Kinds
 from p3i.search.config import SearchConfig
@@ -21,19 +20,20 @@ SCORES = Kinds(
 )
 
 
-@click.command("score", short_help="Say how well a program explains a photo.")
+@grouped.command("score")
 @inputs.words("PHOTO... [PROG]")
-@targets.written(SCORES, "Where to write the numbers.")
-@click.option(
-    "--focal",
-    "focal_mm",
-    type=float,
-    metavar="MM",
-    help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
+@grouped.group(
+    "The score",
+    click.option(
+        "--focal",
+        "focal_mm",
+        type=float,
+        metavar="MM",
+        help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
+    ),
+    options.of(SearchConfig, "features", "weights", "threads"),
 )
-@search_options.features
-@search_options.weights
-@search_options.threads
+@targets.written(SCORES, "Where to write the numbers.")
 @options.quiet
 @options.verbose
 @options.error_format
@@ -44,8 +44,7 @@ def command(**given: Any) -> int:
     edges; less is better, but a smaller pattern has less too) and the normalised score (more is better),
     by which `p3i synth` chooses. Without PROG the program is searched for.
     """
-    weights = Path(given["weights"]) if given["weights"] else None
-    config = options.chosen(SearchConfig, given, weights=weights)
+    config = options.chosen(SearchConfig, given)
 
     def judge(job: Job) -> batch.Answer:
         found = api.score(job.photo, job.program, config, progress=job.update)

@@ -2,32 +2,16 @@
 
 from typing import Any
 
-import click
-
 from p3i import api
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import DRAWINGS, Job, drawn, each_photo
-from p3i.paint.show_options import LABELS, ShowOptions
-from p3i.records import told
-
-sentence, default = told(ShowOptions)
+from p3i.paint.show_options import ShowOptions
 
 
-@click.command("show", short_help="Draw the program over its photo: objects, cells, names, horizon, extent.")
+@grouped.command("show")
 @inputs.words("PHOTO... [PROG]")
+@grouped.group("What to draw", options.of(ShowOptions))
 @targets.written(DRAWINGS, "Where to draw.")
-@options.field(ShowOptions, "labels", type=click.Choice(LABELS))
-@click.option("--points/--no-points", default=default("points"), help=sentence("points"))
-@click.option("--cells/--no-cells", default=default("cells"), help=sentence("cells"))
-@click.option("--horizon/--no-horizon", default=default("horizon"), help=sentence("horizon"))
-@click.option("--extent/--no-extent", default=default("extent"), help=sentence("extent"))
-@click.option(
-    "--presence/--no-presence",
-    default=default("presence"),
-    help=sentence("presence"),
-)
-@options.field(ShowOptions, "longer", type=int, metavar="N")
-@options.focal(ShowOptions)
 @options.quiet
 @options.verbose
 @options.error_format

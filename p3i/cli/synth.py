@@ -2,87 +2,66 @@
 
 import dataclasses
 import json
-import time
+import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import IO, Any
 
 import click
 
 from p3i import api, files
 from p3i.carried import read_program
-from p3i.cli import options, progress, report, search_options
+from p3i.cli import grouped, options, progress, report, workers
 from p3i.cli.batch import exit_code
 from p3i.cli.inputs import INPUT, listed
 from p3i.cli.photos import SUFFIXES, parse_roi
-from p3i.errors import NoPatternError, P3IError, UsageError
-from p3i.records import told
-from p3i.search.config import EXTENTS, RECIPES, STRUCTURES, SearchConfig
-from p3i.search.result import Candidate, StopReason, SynthesisResult
-
-sentence, default = told(SearchConfig)
+from p3i.cli.solving import Outcome, Task, failure, prepare, solve
+from p3i.errors import P3IError, UsageError
+from p3i.search.config import SearchConfig
+from p3i.search.result import Candidate, StopReason
 
 
-class NumberOrWord(click.ParamType):
-    """A number that is `what`, or one of the words, each of which means a value."""
-
-    def __init__(self, unit: str, what: str, words: Mapping[str, str | None]) -> None:
-        self.name = "|".join((unit, *words))
-        self.what, self.words = what, words
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float | str | None:
-        word = str(value).strip().lower()
-        if word in self.words:
-            return self.words[word]
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"{value!r} is neither {self.what} nor {' nor '.join(self.words)}", param, ctx)
-
-
-FOCAL = NumberOrWord("MM", "a focal length in mm", {"auto": "auto"})
-LENS = NumberOrWord("K1", "a radial distortion", {"auto": "auto", "none": None})
-
-
-@click.command("synth", short_help="Find the camera and the program of a photo's pattern.")
+@grouped.command("synth")
 @click.argument("images", metavar="PHOTO...", type=INPUT, nargs=-1, required=True)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["p3p", "jsonl"]),
-    default=None,
-    help="Print a program, or one JSON object a line and photo. [default: by the name of -o, else p3p]",
+@grouped.group(
+    "Output",
+    click.option(
+        "--format",
+        "form",
+        type=click.Choice(["p3p", "jsonl"]),
+        default=None,
+        help="Print a program, or one JSON object a line and photo. [default: by the name of -o, else p3p]",
+    ),
+    options.output("Where to write; - is stdout. Several photos need a folder, or --format jsonl."),
+    options.force,
+    options.of(SearchConfig, "top"),
+    click.option("--trace", type=click.Path(), metavar="FILE", help="Write the search's steps, JSON lines."),
 )
-@options.output("Where to write; - is stdout. Several photos need a folder, or --format jsonl.")
-@options.force
-@options.field(SearchConfig, "structure", metavar="|".join(STRUCTURES))
-@options.field(SearchConfig, "extent", type=click.Choice(EXTENTS))
-@click.option("--sketch", type=INPUT, metavar="FILE", help=sentence("sketch"))
-@click.option("--start", type=INPUT, metavar="FILE", help=sentence("start"))
-@options.field(SearchConfig, "recipe", type=click.Choice(RECIPES))
-@click.option("--exhaustive", "exhaustive_s", type=float, metavar="SECONDS", help=sentence("exhaustive_s"))
-@click.option("--mask", type=INPUT, metavar="FILE", help="A picture whose white pixels are unknown.")
-@click.option(
-    "--roi",
-    metavar="X,Y,W,H|POINTS",
-    help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
+@grouped.group(
+    "What to look for",
+    options.of(SearchConfig, "structure", "extent"),
+    options.of(SearchConfig, "sketch", "start", sketch={"type": INPUT}, start={"type": INPUT}),
+    options.of(SearchConfig, "strict"),
+    click.option("--mask", type=INPUT, metavar="FILE", help="A picture whose white pixels are unknown."),
+    click.option(
+        "--roi",
+        metavar="X,Y,W,H|POINTS",
+        help="Look only here: a rectangle, or a polygon x,y x,y x,y ... in pixels.",
+    ),
 )
-@click.option("--focal", "focal_mm", type=FOCAL, metavar=FOCAL.name, help=sentence("focal_mm"))
-@click.option("--lens", type=LENS, metavar=LENS.name, help=sentence("lens"))
-@search_options.features
-@search_options.weights
-@click.option("--strict", is_flag=True, help=sentence("strict"))
-@click.option("--time", "time_s", type=float, metavar="SECONDS", help=sentence("time_s"))
-@options.field(SearchConfig, "top", type=int, metavar="K")
-@options.field(SearchConfig, "seed", type=int)
-@search_options.device
-@search_options.threads
-@click.option("--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height).")
-@click.option("--trace", type=click.Path(), metavar="FILE", help="Write the search's steps, JSON lines.")
+@grouped.group("The camera", options.of(SearchConfig, "focal_mm", "lens"))
+@grouped.group(
+    "The search",
+    options.of(SearchConfig, "recipe", "exhaustive_s", "features", "weights", "time_s", "seed", "threads"),
+    click.option(
+        "--jobs", type=int, metavar="N", default=1, show_default=True, help="Photos to search at once."
+    ),
+    click.option(
+        "--max-px", type=int, metavar="N", help="Take photos of up to N pixels (width times height)."
+    ),
+)
 @options.quiet
 @options.verbose
 @options.error_format
@@ -110,6 +89,8 @@ class Call:
     mask: str | None
     roi: api.Polygon | None
     max_px: int | None
+    jobs: int
+    """How many processes share the photos."""
     trace: Path | None
     quiet: bool
     verbose: bool
@@ -118,14 +99,9 @@ class Call:
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Call":
         """The call that the options of the command line mean; raises UsageError or FileError."""
-        names = {field.name for field in dataclasses.fields(SearchConfig)}
-        chosen = {name: value for name, value in given.items() if name in names}
-        if chosen["weights"] is not None:
-            chosen["weights"] = Path(chosen["weights"])
-        for name, reader in (("sketch", api.load_sketch), ("start", read_program)):
-            if chosen[name] is not None:
-                chosen[name] = reader(chosen[name])
-        config = SearchConfig(**chosen)
+        readers = {"sketch": api.load_sketch, "start": read_program}
+        read = {name: None if given[name] is None else readers[name](given[name]) for name in readers}
+        config = options.chosen(SearchConfig, given, **read)
         photos = tuple(files.gather(listed(given["images"]), suffixes=SUFFIXES))
         output: str | None = given["output"]
         form = given["form"] or ("jsonl" if output and Path(output).suffix == ".jsonl" else "p3p")
@@ -136,6 +112,10 @@ class Call:
             raise UsageError(f"{len(photos)} photos need -o FOLDER/ or --format jsonl")
         if given["max_px"] is not None and given["max_px"] < 1:
             raise UsageError(f"--max-px must be at least 1, not {given['max_px']}")
+        if given["jobs"] < 1:
+            raise UsageError(f"--jobs must be at least 1, not {given['jobs']}")
+        if given["jobs"] > 1 and "-" in (given["mask"], *map(str, photos)):
+            raise UsageError("standard input is read by one process only: leave out --jobs")
         return cls(
             photos=photos,
             config=config,
@@ -146,6 +126,7 @@ class Call:
             mask=given["mask"],
             roi=parse_roi(given["roi"]),
             max_px=given["max_px"],
+            jobs=given["jobs"],
             trace=Path(given["trace"]) if given["trace"] else None,
             quiet=given["quiet"],
             verbose=given["verbose"] > 0,
@@ -153,40 +134,83 @@ class Call:
         )
 
 
-@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """What came of one photo: a result with its time, or an error with its exit code."""
-
-    photo: Path
-    result: SynthesisResult | None = None
-    error: str = ""
-    code: int = 0
-    seconds: float = 0.0
-
-
 def run(call: Call) -> int:
     """Work through the photos in order, write each answer as soon as it is known, return the exit code."""
     targets = _targets(call)
     _refuse_early(call, targets)
-    import p3i.search.synthesize  # noqa: F401  # torch loads before the first photo's clock starts
-
     codes: list[int] = []
-    with ExitStack() as open_files:
+    with ExitStack() as opened:
         lines = trace = None
         if call.as_jsonl and call.output is not None:
-            lines = open_files.enter_context(files.replacing(call.output, force=call.force))
+            lines = opened.enter_context(files.replacing(call.output, force=call.force))
         if call.trace is not None:
-            trace = open_files.enter_context(files.replacing(call.trace, force=call.force))
-        for number, (photo, target) in enumerate(zip(call.photos, targets, strict=True)):
-            label = photo.name if len(call.photos) == 1 else f"{number + 1}/{len(call.photos)} {photo.name}"
-            with progress.bar(label, wanted=not call.quiet) as update:
-                outcome = _solve(call, photo, target, update=update, trace=trace)
-            _write(call, outcome, target, lines=lines)
-            _talk(call, outcome)
-            codes.append(outcome.code)
-            if outcome.code == 130:
+            trace = opened.enter_context(files.replacing(call.trace, force=call.force))
+        tasks = [_task(call, photo, target) for photo, target in zip(call.photos, targets, strict=True)]
+        answers = opened.enter_context(_answers(call, tasks, trace))
+        for number, (task, target) in enumerate(zip(tasks, targets, strict=True)):
+            name = task.photo.name
+            label = name if len(tasks) == 1 else f"{number + 1}/{len(tasks)} {name}"
+            try:
+                with progress.bar(label, wanted=not call.quiet) as update:
+                    outcome = answers(number, update)
+                if outcome is None:
+                    codes.append(130)
+                    break
+                codes.append(_finish(call, task, outcome, target=target, lines=lines))
+            except KeyboardInterrupt:  # what was written before stays
+                codes.append(130)
                 break
     return exit_code(codes)
+
+
+@contextmanager
+def _answers(
+    call: Call, tasks: Sequence[Task], trace: IO[str] | None
+) -> Iterator[Callable[[int, api.Progress], Outcome | None]]:
+    """What gives the outcome of each photo, by its number, one after another; None after an interrupt."""
+
+    if call.jobs > 1 and len(tasks) > 1:
+        told = not call.quiet and sys.stderr.isatty()
+        with workers.pool(tasks, jobs=call.jobs, traced=trace is not None, told=told) as pool:
+
+            def wait(number: int, update: api.Progress) -> Outcome | None:
+                found = pool.answer(number, update)
+                if found is None:
+                    return None
+                outcome, steps = found
+                if trace is not None:
+                    trace.writelines(steps)
+                return outcome
+
+            yield wait
+        return
+    with workers.held_back("SIGINT", "SIGTERM"):  # torch ends the process where its loading is cut short
+        prepare()
+    interrupted = False
+
+    def work(number: int, update: api.Progress) -> Outcome | None:
+        nonlocal interrupted
+        if interrupted:
+            return None
+        outcome = solve(tasks[number], update=update, note=None if trace is None else trace.write)
+        interrupted = outcome.code == 130
+        return outcome
+
+    yield work
+
+
+def _task(call: Call, photo: Path, target: Path | None) -> Task:
+    written_to = target or (call.output if call.as_jsonl else None)
+    return Task(
+        photo=photo,
+        config=call.config,
+        mask=call.mask,
+        roi=call.roi,
+        max_px=call.max_px,
+        beside=written_to.parent if written_to else None,
+        as_record=call.as_jsonl,
+        raises_bugs=len(call.photos) == 1 and not call.as_jsonl,
+    )
 
 
 def _targets(call: Call) -> list[Path | None]:
@@ -213,94 +237,53 @@ def _refuse_early(call: Call, targets: list[Path | None]) -> None:
         files.check_writable(path, force=call.force)
 
 
-def _solve(call: Call, photo: Path, target: Path | None, *, update: api.Progress, trace: Any) -> Outcome:
-    """Synthesize one photo; every failure but a closed pipe becomes an Outcome, so a batch goes on."""
+def _finish(call: Call, task: Task, outcome: Outcome, *, target: Path | None, lines: IO[str] | None) -> int:
+    """Write and tell what came of a photo; returns its exit code.
 
-    def note(step: Mapping[str, Any]) -> None:
-        trace.write(json.dumps({"image": str(photo), **step}, default=_plain) + "\n")
-
-    written_to = target or (call.output if call.as_jsonl else None)
-    begun = time.perf_counter()
+    A file that cannot be written costs this photo only. The one file of JSON lines, and stdout, are all
+    photos' and their errors are raised.
+    """
     try:
-        result = api.synth(
-            photo,
-            call.config,
-            mask=call.mask,
-            roi=call.roi,
-            max_px=call.max_px,
-            beside=written_to.parent if written_to else None,
-            progress=update,
-            trace=note if trace is not None else None,
-        )
-    except KeyboardInterrupt:
-        error, code = StopReason.INTERRUPTED.value, 130
+        _write(call, outcome, target, lines=lines)
     except BrokenPipeError:
         raise
-    except P3IError as failure:
-        error, code = str(failure), failure.exit_code
-    except MemoryError:
-        error, code = "not enough memory for this photo; scale it down", 3
-    except Exception as failure:
-        if len(call.photos) == 1 and not call.as_jsonl:
+    except Exception as failed:
+        if target is None or task.raises_bugs:
             raise
-        error, code = report.bug_sentence(failure), 70
-    else:
-        seconds = time.perf_counter() - begun
-        code = 130 if result.stop is StopReason.INTERRUPTED else 0
-        if result.program is None:
-            error, code = result.reason, code or NoPatternError.exit_code
-            return Outcome(photo=photo, error=error, code=code, seconds=seconds)
-        return Outcome(photo=photo, result=result, code=code, seconds=seconds)
-    return Outcome(photo=photo, error=error, code=code, seconds=time.perf_counter() - begun)
+        known = isinstance(failed, P3IError)
+        error = str(failed) if known else report.bug_sentence(failed)
+        outcome = failure(task, error, code=failed.exit_code if known else 70)
+    _talk(call, outcome)
+    return outcome.code
 
 
-def _write(call: Call, outcome: Outcome, target: Path | None, *, lines: Any) -> None:
+def _write(call: Call, outcome: Outcome, target: Path | None, *, lines: IO[str] | None) -> None:
     """Write the answer where it belongs, at once."""
     if call.as_jsonl:
-        text = json.dumps(_record(outcome))
+        text = json.dumps(outcome.record)
         if lines is None:
             click.echo(text)
         else:
             lines.write(text + "\n")
             lines.flush()
-        return
-    if outcome.result is None or outcome.result.program is None:
-        return
-    from p3i.grammar.printer import format_program
-
-    layout = "table1" if call.config.strict else "python"
-    best = format_program(outcome.result.program, layout=layout)
-    if target is None:
-        several = outcome.result.candidates if call.config.top > 1 else ()
-        text = best if len(several) < 2 else _one_after_another(several, layout=layout)
+    elif target is None and outcome.result is not None:
+        text = "\n".join(_headed(outcome.texts, outcome.result.candidates))
         click.echo(text.encode("utf-8"), nl=False)  # whatever the locale says
-        return
-    with files.replacing(target, force=call.force) as stream:
-        stream.write(best)
-    for rank, candidate in enumerate(outcome.result.candidates[1 : call.config.top], start=2):
-        with files.replacing(_ranked(target, rank), force=call.force) as stream:
-            stream.write(format_program(candidate.program, layout=layout))
+    elif target is not None:
+        for rank, text in enumerate(outcome.texts, start=1):
+            with files.replacing(target if rank == 1 else _ranked(target, rank), force=call.force) as stream:
+                stream.write(text)
 
 
-def _one_after_another(candidates: Sequence[Candidate], *, layout: Literal["python", "table1"]) -> str:
-    """The programs of several candidates, each under a comment that says which it is."""
-    from p3i.grammar.printer import format_program
-
-    texts = []
-    for rank, candidate in enumerate(candidates, start=1):
-        what = f"{candidate.structure}, score {candidate.score:.4f}"
-        text = format_program(candidate.program, layout=layout)
-        texts.append(f"# candidate {rank} of {len(candidates)}: {what}\n{text}")
-    return "\n".join(texts)
-
-
-def _record(outcome: Outcome) -> dict[str, Any]:
-    from p3i.search.record import answer_record, failure_record
-
-    name = str(outcome.photo)
-    if outcome.result is None:
-        return failure_record(image=name, error=outcome.error, code=outcome.code, seconds=outcome.seconds)
-    return answer_record(outcome.result, image=name, seconds=outcome.seconds)
+def _headed(texts: Sequence[str], candidates: Sequence[Candidate]) -> list[str]:
+    """The texts of several candidates, each under a comment that says which it is; a single one as it is."""
+    if len(texts) < 2:
+        return list(texts)
+    heads = [f"{candidate.structure}, score {candidate.score:.4f}" for candidate in candidates]
+    return [
+        f"# candidate {rank} of {len(texts)}: {head}\n{text}"
+        for rank, (head, text) in enumerate(zip(heads, texts, strict=False), start=1)
+    ]
 
 
 def _talk(call: Call, outcome: Outcome) -> None:
@@ -331,8 +314,3 @@ def _talk(call: Call, outcome: Outcome) -> None:
 def _ranked(target: Path, rank: int) -> Path:
     """The file of a runner-up: a.p3p, a.2.p3p, a.3.p3p, ..."""
     return target.with_name(f"{target.stem}.{rank}{target.suffix}")
-
-
-def _plain(value: Any) -> Any:
-    """What json cannot write, as it can: arrays and tensors as lists, the rest as text."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)

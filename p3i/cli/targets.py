@@ -10,10 +10,9 @@
   before the work begins.
 """
 
-import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from typing import Any
 import click
 
 from p3i import files
-from p3i.cli import options
+from p3i.cli import grouped, options
 from p3i.errors import UsageError
 
 STDOUT = "-"
@@ -65,36 +64,29 @@ class Kinds:
         return self.endings.get(kind, f".{kind}")
 
 
-def written(kinds: Kinds, sentence: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def written(kinds: Kinds, sentence: str) -> grouped.Decorator:
     """The options `-o`, `--format`, `--json` and `--force`; `sentence` says what is written."""
-
-    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
-        for option in reversed(
-            (
-                options.output(
-                    f"{sentence} The suffix tells the kind; - is stdout, DIR/ gets a file for each input."
-                ),
-                click.option(
-                    "--format",
-                    "kind",
-                    type=click.Choice(kinds.all),
-                    default=None,
-                    help=f"The {kinds.what}. [default: by the name of -o, else {kinds.all[0]}]",
-                ),
-                click.option(
-                    "--json",
-                    "json_to",
-                    metavar="FILE|DIR|-",
-                    default=None,
-                    help="Write the facts as JSON, of several inputs an object a line; - is stdout.",
-                ),
-                options.force,
-            )
-        ):
-            function = option(function)
-        return function
-
-    return declare
+    return grouped.group(
+        "Output",
+        options.output(
+            f"{sentence} The suffix tells the kind; - is stdout, DIR/ gets a file for each input."
+        ),
+        click.option(
+            "--format",
+            "kind",
+            type=click.Choice(kinds.all),
+            default=None,
+            help=f"The {kinds.what}. [default: by the name of -o, else {kinds.all[0]}]",
+        ),
+        click.option(
+            "--json",
+            "json_to",
+            metavar="FILE|DIR|-",
+            default=None,
+            help="Write the facts as JSON, of several inputs an object a line; - is stdout.",
+        ),
+        options.force,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,9 +175,12 @@ def _files(found: Targets) -> list[str]:
 
 def _refuse_clashes(found: Targets, *, taken: Iterable[str | None]) -> None:
     """Raise UsageError for a file that would be written twice, or is read here."""
-    places = [os.path.realpath(place) for place in _files(found)]
-    if twice := [place for place, count in Counter(places).items() if count > 1]:
-        raise UsageError(f"answer and facts would both be written to {twice[0]}")
-    read = {os.path.realpath(path) for path in taken if path is not None and path != STDOUT}
-    if clash := sorted(read & set(places)):
-        raise UsageError(f"{clash[0]} is read here: write to another file")
+    written: set[object] = set()
+    read = {files.place_of(path) for path in taken if path is not None and path != STDOUT}
+    for name in _files(found):
+        place = files.place_of(name)
+        if place in written:
+            raise UsageError(f"answer and facts would both be written to {name}")
+        if place in read:
+            raise UsageError(f"{name} is read here: write to another file")
+        written.add(place)

@@ -1,45 +1,17 @@
-"""`p3i tile`: a photos in, seamless textures of their patterns' cells out."""
+"""`p3i tile`: photos in, seamless textures of their patterns' cells out."""
 
-import re
 from typing import Any
 
-import click
-
 from p3i import api
-from p3i.cli import batch, inputs, options, targets
+from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made
-from p3i.cli.render import SizeType
-from p3i.paint.tile_options import SOURCES, TileOptions
-from p3i.records import told
-
-sentence, default = told(TileOptions)
+from p3i.paint.tile_options import TileOptions
 
 
-class RepeatType(click.ParamType):
-    """`NxM`: times across and down."""
-
-    name = "NxM"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value
-        found = re.fullmatch(r"\s*(\d{1,9})\s*[xX×*,]\s*(\d{1,9})\s*", str(value))  # noqa: RUF001
-        if found is None:
-            self.fail(f"{value!r} is no number of times: write across and down, as in 3x2")
-        return int(found[1]), int(found[2])
-
-
-@click.command("tile", short_help="Make a seamless texture of a photo's pattern.")
+@grouped.command("tile")
 @inputs.words("PHOTO... [PROG]")
+@grouped.group("The tile", options.of(TileOptions))
 @targets.written(PICTURES, "Where to write the picture.")
-@options.field(TileOptions, "source", "--from", "source", type=click.Choice(SOURCES))
-@click.option("--size", type=SizeType(), metavar="WxH", help=sentence("size"))
-@click.option("--repeat", type=RepeatType(), metavar="NxM", default=(1, 1), help=sentence("repeat"))
-@options.field(TileOptions, "light", "--even-light/--keep-light", "light")
-@options.focal(TileOptions)
-@options.max_px(TileOptions)
 @options.quiet
 @options.verbose
 @options.error_format

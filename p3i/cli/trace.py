@@ -5,13 +5,13 @@ from pathlib import Path
 import click
 
 from p3i import api, files
-from p3i.cli import options, report
+from p3i.cli import grouped, options, report
 from p3i.errors import UsageError
 
 _KINDS = (".gif", ".png")
 
 
-@click.command("trace", short_help="Show a search as a moving picture.")
+@grouped.command("trace")
 @click.argument("trace", metavar="TRACE", type=click.Path())
 @options.output("Where to draw: a .gif moves, a .png is a contact sheet.")
 @click.option("--image", metavar="PHOTO", help="The photo, where it is not where the trace says; or which.")

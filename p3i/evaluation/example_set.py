@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def write_examples(
         todo.extend((structure, k) for k in range(count))
     if not todo:
         raise UsageError("a set of no scenes: ask for lattices, rings or hybrids")
-    if folder.exists() and not folder.is_dir():
+    if os.path.lexists(folder) and not os.path.isdir(folder):
         raise FileError(f"{folder} is a file; a set of examples needs a folder")
     if not force:
         _refuse_what_exists(folder, [name_of(structure, k) for structure, k in todo])
@@ -90,5 +91,5 @@ def _refuse_what_exists(folder: Path, names: list[str]) -> None:
         targets += [folder / "programs" / f"{name}.p3p"]
         targets += [folder / "images" / f"{name}{suffix}" for suffix in (".png", ".jpg")]
     for target in targets:
-        if target.exists():
+        if os.path.lexists(target):
             raise FileError(f"{target} exists already: name another folder, or say --force")

@@ -4,6 +4,7 @@ import concurrent.futures
 import dataclasses
 import json
 import multiprocessing
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,6 +17,7 @@ import numpy as np
 from p3i.errors import FileError, P3IError, UsageError
 from p3i.evaluation.measures import Measures, measure
 from p3i.evaluation.truth import STRUCTURES, Truth, read_truth
+from p3i.files import read_text
 from p3i.grammar.ast import Header, Program
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
@@ -170,10 +172,7 @@ def read_results(path: Path) -> dict[str, Mapping[str, Any]]:
 
     Raises FileError for a file that cannot be read or holds no record.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
+    lines = read_text(path).splitlines()
     found: dict[str, Mapping[str, Any]] = {}
     for line in lines:
         try:
@@ -203,7 +202,7 @@ def _answers(
 def _photo(folder: Path, file: str) -> Path:
     """A photo's file: as the annotation names it, or in images/."""
     direct = folder / file
-    return direct if direct.is_file() else folder / "images" / Path(file).name
+    return direct if os.path.isfile(direct) else folder / "images" / Path(file).name
 
 
 def _answer(photo: Path, config: SearchConfig) -> tuple[dict[str, Any], float, float]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from p3i.errors import FileError
+from p3i.files import read_text
 from p3i.interp.camera import Camera
 from p3i.size import Size
 
@@ -55,9 +56,7 @@ def read_truth(folder: Path) -> tuple[Truth, ...]:
     """
     path = folder / "annotations.json"
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(f"cannot read {path}: {error.strerror or error}") from error
+        told = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise FileError(f"{path} is no JSON ({error})") from None
     if not isinstance(told, list) or not told:

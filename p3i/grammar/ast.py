@@ -6,7 +6,6 @@ reason about them. Spans and comments are carried along, but two programs that m
 Nothing outside p3i.grammar sees a lark tree.
 """
 
-import importlib
 import math
 from dataclasses import dataclass, field
 from typing import Literal
@@ -147,7 +146,3 @@ class Program:
     world: Statement
     header: Header | None = None
     trailing_comments: tuple[str, ...] = field(default=(), compare=False, repr=False)
-
-    def _repr_html_(self) -> str:
-        """What notebooks show. Looked up by name: the grammar does not know who draws."""
-        return importlib.import_module("p3i.notebook").program_html(self)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from p3i.grammar.ast import Draw, For, Polar, Program, Span
 from p3i.grammar.diagnostics import Diagnostic, error, warning
 from p3i.grammar.leaves import affines, statements
-from p3i.grammar.report import line_and_column, line_starts
+from p3i.grammar.source import line_and_column, line_starts
 
 
 def errors(program: Program, *, source: str = "") -> tuple[Diagnostic, ...]:

@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from p3i.errors import ProgramError
 from p3i.grammar.ast import Span
 
 Severity = Literal["error", "warning"]
@@ -80,41 +79,7 @@ def warning(
     return Diagnostic(code, "warning", message, span, help, label)
 
 
-def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
-    """Whether any of the diagnostics is an error."""
-    return any(found.severity == "error" for found in diagnostics)
-
-
 def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """The diagnostics in the order of the text, each once; those without a place come first."""
     unique = dict.fromkeys(diagnostics)
     return tuple(sorted(unique, key=lambda found: found.span.start if found.span else -1))
-
-
-class ParseError(ProgramError):
-    """A text is not a program, or its program cannot be walked.
-
-    `diagnostics` hold all that was found, `source` and `path` what was read; `report` quotes the text.
-    """
-
-    def __init__(
-        self, diagnostics: tuple[Diagnostic, ...], *, source: str = "", path: str = "<program>"
-    ) -> None:
-        self.diagnostics = diagnostics
-        self.source = source
-        self.path = path
-        super().__init__(diagnostics, source, path)
-
-    def __str__(self) -> str:
-        """The first error in one line, and how many more there are."""
-        from p3i.grammar.report import one_line  # report.py reads this module
-
-        return one_line(self.diagnostics, source=self.source, path=self.path)
-
-    def report(self, *, as_json: bool = False, color: bool = False) -> str:
-        """All findings as `p3i check` prints them, lines included."""
-        from p3i.grammar.report import report_human, report_json
-
-        if as_json:
-            return report_json(self.diagnostics, source=self.source, path=self.path)
-        return report_human(self.diagnostics, source=self.source, path=self.path, color=color)

@@ -182,7 +182,13 @@ def _header(values: dict[str, Any], block: Sequence[Comment]) -> tuple[Header | 
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Whether the value is a number that a double holds: TOML's whole numbers have no end."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def _is_canvas(value: Any) -> bool:

@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from typing import Literal
 
 from p3i.grammar.ast import Affine, Coordinate, Draw, For, If, Polar, Program
-from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.departures import departures
 from p3i.grammar.header import header_lines
 from p3i.grammar.leaves import statements
+from p3i.grammar.parse_error import ParseError
 
 Layout = Literal["python", "table1"]
 _INDENT = "    "
@@ -25,8 +26,6 @@ def format_program(program: Program, *, layout: Layout = "python") -> str:
     """
     if layout == "python":
         return python_text(program)
-    from p3i.grammar.strict import departures  # strict.py names what it finds in the printer's words
-
     left = departures(program)
     if left:
         raise ParseError(left)

@@ -12,7 +12,6 @@ from typing import Any
 from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedInput
 from lark.lark import PostLex
 
-from p3i.grammar import tables
 from p3i.grammar.heads import Head, HeadReader
 
 HEAD_RULES = {"CAMERA": "camera", "FOR": "for_head", "IF": "if_head", "DRAW": "draw"}
@@ -71,20 +70,17 @@ def _stopped(problem: Any) -> Stopped:
 
 @cache
 def _superset() -> Any:
-    """The reader of p3p.lark, a Lark, made once a process: from its tables where they are fresh."""
-    grammar = grammar_text("p3p.lark")
-    return tables.load(grammar, transformer=HeadReader(), postlex=_KeepEverything()) or build_superset(
-        grammar
-    )
+    """The reader of p3p.lark, made once a process: in about 20 ms."""
+    return build_superset()
 
 
-def build_superset(grammar: str) -> Lark:
-    """The reader of p3p.lark from its text.
+def build_superset() -> Lark:
+    """A reader of p3p.lark.
 
     Its callbacks run while it parses, so that there is neither a tree nor recursion.
     """
     return Lark(
-        grammar,
+        grammar_text("p3p.lark"),
         parser="lalr",
         lexer="basic",
         start=["program", *HEAD_RULES.values()],

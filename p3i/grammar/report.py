@@ -6,11 +6,11 @@ terminal: control characters are shown as U+FFFD, and wide characters count as t
 
 import json
 import unicodedata
-from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 
 from p3i.grammar.ast import Span
 from p3i.grammar.diagnostics import Diagnostic
+from p3i.grammar.source import line_and_column, line_starts
 
 _COLOURS = {
     "error": "\x1b[1;31m",
@@ -62,21 +62,6 @@ def one_line(diagnostics: Sequence[Diagnostic], *, source: str, path: str) -> st
         place = f"{path}:{line}:{column}"
     more = f" (and {len(diagnostics) - 1} more)" if len(diagnostics) > 1 else ""
     return printable(f"{place}: {first.code}: {first.message}{more}")
-
-
-def line_starts(source: str) -> list[int]:
-    """Offsets at which the lines of `source` begin; LF, CRLF and CR end a line, as in the grammar."""
-    starts = [0]
-    for offset, character in enumerate(source):
-        if character == "\n" or (character == "\r" and source[offset + 1 : offset + 2] != "\n"):
-            starts.append(offset + 1)
-    return starts
-
-
-def line_and_column(offset: int, starts: list[int]) -> tuple[int, int]:
-    """Line and column of an offset, both from 1, the column in characters."""
-    line = bisect_right(starts, offset)
-    return line, offset - starts[line - 1] + 1
 
 
 def _place(offset: int, starts: list[int]) -> dict[str, int]:

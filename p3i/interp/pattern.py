@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from p3i.grammar.ast import Affine, Coordinate, Program
+from p3i.grammar.ast import Affine, Coordinate, Polar, Program
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.camera import Camera, image_from_plane, project
 from p3i.interp.unroll import nest
@@ -39,6 +39,15 @@ class Pattern:
     theta: Tensor
     index: Tensor
     edges: Tensor
+
+    @property
+    def turning(self) -> int | None:
+        """The loop variable that goes round a curve, 0 for i and 1 for j; None where draws stand in rows."""
+        draw = nest(self.program).draw
+        for form in (draw.x, draw.y):
+            if isinstance(form, Polar):
+                return 1 if form.angle.j != 0 else 0
+        return None
 
     def centers(self, theta: Tensor | None = None) -> Tensor:
         """The drawn points: theta [..., P] -> [..., N, 2], in program units."""

@@ -12,9 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from p3i.grammar.ast import Affine, Coordinate, Draw, For, If, Polar, Program, Span
-from p3i.grammar.diagnostics import ParseError, error
+from p3i.grammar.diagnostics import error
 from p3i.grammar.leaves import statements
 from p3i.grammar.limits import DRAWS
+from p3i.grammar.parse_error import ParseError
 
 SLACK = 1e-9
 """What rounding may cost a bound or a guard: 0.07 * 100 is 7.000000000000001 and must count as 7."""
@@ -129,7 +130,7 @@ def distinct(found: Sequence[Point]) -> list[int]:
     kept: list[int] = []
     buckets: dict[tuple[int, int], list[int]] = {}
     for place, (x, y, *_) in enumerate(found):
-        column, row = math.floor(x / COINCIDE), math.floor(y / COINCIDE)
+        column, row = _bucket(x), _bucket(y)
         near = (
             other
             for across in (column - 1, column, column + 1)
@@ -142,19 +143,26 @@ def distinct(found: Sequence[Point]) -> list[int]:
     return kept
 
 
+def _bucket(value: float) -> int:
+    """Which stretch of length COINCIDE holds the value; far out, where doubles lie apart, each its own."""
+    stretch = value / COINCIDE
+    return math.floor(stretch if math.isfinite(stretch) else value)
+
+
 def on_one_line(found: Sequence[Point]) -> bool:
     """Whether all points lie on one straight line, to within a millionth of its length; no points do not."""
     if not found:
         return False
-    x0, y0, *_ = found[0]
-    x1, y1, *_ = max(found, key=lambda point: math.hypot(point[0] - x0, point[1] - y0))
-    length = math.hypot(x1 - x0, y1 - y0)
-    if length <= COINCIDE:
+    # Products of large coordinates would overflow: all is told in the largest of them.
+    unit = max(1.0, max(max(abs(x), abs(y)) for x, y, *_ in found))
+    x0, y0 = found[0][0] / unit, found[0][1] / unit
+    steps = [(x / unit - x0, y / unit - y0) for x, y, *_ in found]
+    across, down = max(steps, key=lambda step: math.hypot(*step))
+    length = math.hypot(across, down)
+    if length <= COINCIDE / unit:
         return True
-    return all(
-        abs((x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)) / length <= COINCIDE * max(length, 1.0)
-        for x, y, *_ in found
-    )
+    tolerance = COINCIDE * max(length, 1 / unit)
+    return all(abs(x * down - y * across) / length <= tolerance for x, y in steps)
 
 
 def in_front(program: Program, found: Sequence[Point], *, focal_mm: float) -> list[bool]:

@@ -8,28 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from p3i.errors import UsageError
-from p3i.records import check_focal
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EditOptions:
-    """How to lay the objects anew. Raises UsageError for a value out of range."""
-
-    scale: Annotated[
-        float | None,
-        "How large new objects are, 1 as they were; auto makes them smaller where the new program stands "
-        "closer. [default: auto]",
-    ] = None
-    focal_mm: Annotated[
-        float | None,
-        "35 mm-equivalent focal length; by default that of the old program's header, else of the photo, "
-        "else 35.",
-    ] = None
-
-    def __post_init__(self) -> None:
-        if self.scale is not None and not (math.isfinite(self.scale) and 0.05 <= self.scale <= 20):
-            raise UsageError(f"a scale lies between 0.05 and 20, or is auto, not {self.scale:g}")
-        check_focal(self.focal_mm)
+from p3i.records import Spelt, check_focal
 
 
 def parse_scale(text: str) -> float | None:
@@ -40,3 +19,26 @@ def parse_scale(text: str) -> float | None:
         return float(text)
     except ValueError:
         raise UsageError(f"--scale {text}: write auto or a number, such as 1") from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EditOptions:
+    """How to lay the objects anew. Raises UsageError for a value out of range."""
+
+    scale: Annotated[
+        float | None,
+        "How large new objects are, 1 as they were; auto makes them smaller where the new program stands "
+        "closer. [default: auto]",
+        Spelt(metavar="auto|S", read=parse_scale),
+    ] = None
+    focal_mm: Annotated[
+        float | None,
+        "35 mm-equivalent focal length; by default that of the old program's header, else of the photo, "
+        "else 35.",
+        Spelt("--focal", metavar="MM"),
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.scale is not None and not (math.isfinite(self.scale) and 0.05 <= self.scale <= 20):
+            raise UsageError(f"a scale lies between 0.05 and 20, or is auto, not {self.scale:g}")
+        check_focal(self.focal_mm)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal
 
 SIDES = ("left", "top", "right", "bottom")
 """The sides of a picture, in the order in which margins are given."""
@@ -71,8 +71,11 @@ class ExtendOptions:
         Margins,
         "How far to each side: 20%, 80px, or four for left, top, right, bottom as in 10%,0,10%,0. Per cent "
         "are of the width (left, right) and of the height (top, bottom). [default: 20%]",
+        Spelt(metavar="N%|N|L,T,R,B", read=parse_margins),
     ] = Margins(20, 20, 20, 20, "%")
-    max_px: Annotated[int, "Make no picture of more than N pixels (width times height)."] = 100_000_000
+    max_px: Annotated[
+        int, "Make no picture of more than N pixels (width times height).", Spelt(metavar="N")
+    ] = 100_000_000
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:

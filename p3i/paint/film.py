@@ -3,10 +3,11 @@
 Whatever the step weighed (a lattice, a ring, a filled sketch) is drawn by the same code, the interpreter's.
 """
 
+import io
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,7 @@ from PIL import Image as Pil
 from PIL import ImageDraw, ImageFont
 
 from p3i.errors import FileError, UsageError
+from p3i.files import read_text
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import edges, points
 from p3i.paint.steps import Search, Step, read_steps
@@ -68,13 +70,7 @@ def film_of(trace: Path, *, image: str | None = None) -> Film:
     `image` picks one by its name. Raises FileError for a trace or an `image` that cannot be read, UsageError
     where several searches leave a choice.
     """
-    try:
-        with open(trace, encoding="utf-8") as lines:
-            searches = read_steps(lines, name=str(trace))
-    except UnicodeDecodeError:
-        raise FileError(f"{trace}: a trace is text in UTF-8, and this is not") from None
-    except OSError as error:
-        raise FileError(f"cannot read {trace}: {error.strerror or error}") from error
+    searches = read_steps(io.StringIO(read_text(trace)), name=str(trace))
     search = _chosen(searches, image, trace)
     notes: list[str] = []
     if not search.ended:
@@ -98,7 +94,7 @@ def _chosen(searches: tuple[Search, ...], image: str | None, trace: Path) -> Sea
 def _photo(search: Search, image: str | None, beside: Path) -> tuple[np.ndarray | None, str]:
     """The photo as uint8 [H, W, 3], or None with a remark."""
     places = [Path(image)] if image else [Path(search.image), beside / search.image] if search.image else []
-    place = next((one for one in places if one.is_file()), None)
+    place = next((one for one in places if os.path.isfile(one)), None)
     if place is None and image:
         place = Path(image)  # whose reader says what is wrong
     if place is None:
@@ -148,7 +144,7 @@ def as_gif(pictures: Sequence[tuple[np.ndarray, int]]) -> bytes:
     first, *others = [
         Pil.fromarray(picture).quantize(palette=palette, dither=Pil.Dither.NONE) for picture, _ in pictures
     ]
-    stream = BytesIO()
+    stream = io.BytesIO()
     durations = [duration for _, duration in pictures]
     first.save(stream, "GIF", save_all=True, append_images=others, duration=durations, loop=0, disposal=1)
     return stream.getvalue()

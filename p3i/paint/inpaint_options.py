@@ -6,12 +6,13 @@ Imports neither torch nor numpy: `p3i inpaint --help` reads this file.
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal
 
-METHODS = ("stack", "npn", "patchmatch")
+Method = Literal["stack", "npn", "patchmatch"]
+METHODS: tuple[Method, ...] = get_args(Method)
 """The ways to fill a hole."""
 
 
@@ -20,12 +21,16 @@ class InpaintOptions:
     """How to fill a hole. Raises UsageError for a value out of range."""
 
     method: Annotated[
-        str,
+        Method,
         "stack: a mean of aligned cells, in seconds; npn: the paper's neural painting network, trained on "
         "this one photo, in minutes; patchmatch: PatchMatch guided by the program (extra `patchmatch`).",
     ] = "stack"
-    steps: Annotated[int, "With npn: steps of training for each part of the hole."] = 400
-    time_s: Annotated[float | None, "With npn: stop training after this many seconds."] = None
+    steps: Annotated[int, "With npn: steps of training for each part of the hole.", Spelt(metavar="N")] = 400
+    time_s: Annotated[
+        float | None,
+        "With npn: stop training after this many seconds.",
+        Spelt("--time", metavar="SECONDS"),
+    ] = None
     checkpoint: Annotated[
         Path | None, "With npn: a file that the training is kept in, and goes on from where it exists."
     ] = None

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Annotated
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
-from p3i.size import Size
+from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.size import Size, parse_size
 
 KINDS = ("png", "svg", "pdf")
 """What `RenderedPicture.encode` can make."""
@@ -26,6 +26,7 @@ class RenderOptions:
         Size | None,
         "Width and height of the picture in pixels; by default those of the photo, else of the program's "
         "canvas, else what fits the drawn objects.",
+        Spelt(metavar="WxH", read=parse_size),
     ] = None
     plane: Annotated[bool, "Draw the plane as seen straight on instead of as the camera sees it."] = False
     markers: Annotated[
@@ -39,11 +40,12 @@ class RenderOptions:
     sprite_units: Annotated[
         float | None,
         "The longer side of an object's picture in program units; by default a little less than the spacing.",
+        Spelt(metavar="U"),
     ] = None
     focal_mm: PhotoFocal = None
-    max_px: Annotated[int, "Refuse to make pictures of more than N pixels (width times height)."] = (
-        100_000_000
-    )
+    max_px: Annotated[
+        int, "Refuse to make pictures of more than N pixels (width times height).", Spelt(metavar="N")
+    ] = 100_000_000
 
     def __post_init__(self) -> None:
         check_focal(self.focal_mm)

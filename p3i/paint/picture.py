@@ -9,6 +9,7 @@ from p3i.errors import UsageError
 from p3i.paint.picture_kinds import PICTURE_KINDS, picture_kind
 from p3i.size import Size
 from p3i.vision.image import Image
+from p3i.vision.tiff import has_tifffile
 from p3i.vision.write import encode, write_bytes
 
 _WITHOUT_ALPHA = {"jpg"}
@@ -40,8 +41,11 @@ class Picture:
             found.append("JPEG keeps no transparency: what is not known is white")
         if self.bits == 16 and kind not in ("png", "tiff"):
             found.append(f"{kind.upper()} keeps 8 of 16 bits: write PNG or TIFF for all of them")
-        if self.bits == 16 and kind == "tiff" and self.exif:
-            found.append("a TIFF of 16 bits is written without EXIF: write PNG to keep it")
+        if self.bits == 16 and kind == "tiff" and (self.exif or self.icc or self.dpi) and not has_tifffile():
+            found.append(
+                "a TIFF of 16 bits is written without EXIF, colour profile and resolution:"
+                " pip install 'p3i[tiff]', or write PNG, to keep them"
+            )
         return tuple(found)
 
     def encode(self, kind: str) -> bytes:

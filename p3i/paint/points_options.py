@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Annotated
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
-from p3i.size import Size
+from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.size import Size, parse_size
 
 FORMATS = ("csv", "json", "coco", "labelme", "geojson", "svg", "dxf")
 """What a list of objects can be written as."""
@@ -27,13 +27,18 @@ class PointsOptions:
     size: Annotated[
         Size | None,
         "Width and height of the photo in pixels, where there is no photo; by default the program's canvas.",
+        Spelt(metavar="WxH", read=parse_size),
     ] = None
     min_presence: Annotated[
-        float, "Leave out objects whose presence in the photo is less than P, between 0 and 1."
+        float,
+        "Leave out objects whose presence in the photo is less than P, between 0 and 1.",
+        Spelt(metavar="P"),
     ] = 0.0
-    outside: Annotated[bool, "List the objects that lie outside the photo too."] = False
+    outside: Annotated[bool, "List the objects that lie outside the photo too.", Spelt("--all")] = False
     clip: Annotated[bool, "Cut the cells off at the photo's edge (COCO always does)."] = False
-    label: Annotated[str, "The class of the objects in COCO, labelme and GeoJSON."] = "object"
+    label: Annotated[str, "The class of the objects in COCO, labelme and GeoJSON.", Spelt(metavar="WORD")] = (
+        "object"
+    )
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:

@@ -6,12 +6,13 @@ Imports neither torch nor numpy: `p3i rectify --help` reads this file.
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal
 
-CROPS = ("pattern", "inside", "all", "same")
+Crop = Literal["pattern", "inside", "all", "same"]
+CROPS: tuple[Crop, ...] = get_args(Crop)
 """What of the plane a straightened view shows."""
 
 _TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
@@ -49,7 +50,7 @@ class RectifyOptions:
     """What of the plane to show, how large, and which way up. Raises UsageError for a value out of range."""
 
     crop: Annotated[
-        str,
+        Crop,
         "What to show: the pattern with a cell's margin, the largest rectangle inside which all is known, "
         "all of the photo that is not too near to the horizon, or the photo's own canvas and place.",
     ] = "pattern"
@@ -57,20 +58,27 @@ class RectifyOptions:
         float | None,
         "Pixels of the view per pixel of the photo, where the photo is sharpest at the pattern's middle. "
         "[default: 1, or less where --max-px asks for it]",
+        Spelt(metavar="S"),
     ] = None
-    max_px: Annotated[int, "Make no view of more than N pixels (width times height)."] = 36_000_000
+    max_px: Annotated[int, "Make no view of more than N pixels (width times height).", Spelt(metavar="N")] = (
+        36_000_000
+    )
     cell: Annotated[
         CellSize | None,
         "The true size of one cell of a lattice, such as 600x600mm: sets the proportions, whatever the "
         "focal, and the resolution (dpi) of the file.",
+        Spelt(metavar="WxHmm", read=parse_cell),
     ] = None
     upright: Annotated[
-        bool, "Turn the view so that the lattice's rows run across, or leave it as the camera saw it."
+        bool,
+        "Turn the view so that the lattice's rows run across, or leave it as the camera saw it.",
+        Spelt("--upright/--as-seen"),
     ] = True
     tolerance: Annotated[
         float | None,
         "With --back: how much a pixel (0 to 255) must differ to count as edited. [default: 0; 16 where the "
         "edited file is a JPEG or WebP, whose every pixel differs]",
+        Spelt(metavar="T"),
     ] = None
     focal_mm: PhotoFocal = None
 

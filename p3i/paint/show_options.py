@@ -4,12 +4,13 @@ Each field carries the sentence that documents it. Imports neither torch nor num
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal
 
-LABELS = ("names", "index", "none")
+Labels = Literal["names", "index", "none"]
+LABELS: tuple[Labels, ...] = get_args(Labels)
 """What may be written at the objects."""
 
 
@@ -18,7 +19,7 @@ class ShowOptions:
     """What to draw over the photo. Raises UsageError for a value out of range."""
 
     labels: Annotated[
-        Literal["names", "index", "none"],
+        Labels,
         "What to write at the objects, where there is room: names as `p3i points` gives them, i and j, or "
         "nothing.",
     ] = "names"
@@ -30,7 +31,9 @@ class ShowOptions:
     horizon: Annotated[bool, "Draw the plane's vanishing line, where it crosses the picture."] = True
     extent: Annotated[bool, "Draw a line around all cells together."] = True
     presence: Annotated[bool, "Look which objects are there; else each gets a dot."] = True
-    longer: Annotated[int, "Reduce larger photos to a longer side of N pixels first."] = 3000
+    longer: Annotated[int, "Reduce larger photos to a longer side of N pixels first.", Spelt(metavar="N")] = (
+        3000
+    )
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:

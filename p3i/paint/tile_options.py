@@ -3,15 +3,25 @@
 Imports neither torch nor numpy: `p3i tile --help` reads this file.
 """
 
+import re
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, check_focal
-from p3i.size import Size
+from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.size import Size, parse_size
 
-SOURCES = ("mean", "best")
+TileSource = Literal["mean", "best"]
+SOURCES: tuple[TileSource, ...] = get_args(TileSource)
 """What a tile is made of."""
+
+
+def parse_repeat(text: str) -> tuple[int, int]:
+    """`NxM`, times across and down; raises UsageError for anything else."""
+    found = re.fullmatch(r"\s*(\d{1,9})\s*[xX×*,]\s*(\d{1,9})\s*", text)  # noqa: RUF001
+    if found is None:
+        raise UsageError(f"{text!r} is no number of times: write across and down, as in 3x2")
+    return int(found[1]), int(found[2])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,19 +29,29 @@ class TileOptions:
     """Of what to make a tile, and how large. Raises UsageError for a value out of range."""
 
     source: Annotated[
-        str,
+        TileSource,
         "Make the tile from the robust mean of the cells, or from the best single cell, its borders blended "
         "into what follows on the other side.",
+        Spelt("--from"),
     ] = "mean"
     size: Annotated[
         Size | None,
         "Width and height of one tile in pixels; by default as fine as the photo is at the pattern's middle.",
+        Spelt(metavar="WxH", read=parse_size),
     ] = None
-    repeat: Annotated[tuple[int, int], "Lay the tile this many times across and down."] = (1, 1)
-    light: Annotated[bool, "Remove the light's gradient over the cells, or keep it as it is."] = True
-    max_px: Annotated[int, "Refuse to make pictures of more than N pixels (width times height)."] = (
-        100_000_000
-    )
+    repeat: Annotated[
+        tuple[int, int],
+        "Lay the tile this many times across and down.",
+        Spelt(metavar="NxM", read=parse_repeat),
+    ] = (1, 1)
+    light: Annotated[
+        bool,
+        "Remove the light's gradient over the cells, or keep it as it is.",
+        Spelt("--even-light/--keep-light"),
+    ] = True
+    max_px: Annotated[
+        int, "Refuse to make pictures of more than N pixels (width times height).", Spelt(metavar="N")
+    ] = 100_000_000
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:

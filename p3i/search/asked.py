@@ -6,18 +6,19 @@ from collections.abc import Callable
 
 from p3i.errors import SketchError
 from p3i.grammar.ast import Header
-from p3i.grammar.diagnostics import ParseError
 from p3i.grammar.leaves import with_leaves
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.enumerate import sketches_by_length
 from p3i.search.fill import whole_program_sketch
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 from p3i.search.sketched import WALKED, find_by_sketch, most_drawn, structure_of
 from p3i.search.sketches import FAMILIES
 from p3i.size import Size

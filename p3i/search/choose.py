@@ -26,10 +26,10 @@ from p3i.grammar.leaves import leaves
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
 from p3i.search.evidence import Evidence
-from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing, turning
+from p3i.search.patches import SIDE, frames, patch_contrast, sample_px, spacing
 from p3i.search.score import without_doubles
-from p3i.search.session import Answer
 
 # Samples of a patch that count as independent of each other: about 7 x 7; in a small patch, pixels two apart.
 _SAMPLES = 50.0
@@ -125,7 +125,7 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
 
 def _patch_side(pattern: Pattern) -> float:
     """How wide patches are, in program units: as far as draws lie apart, on rings where they lie closest."""
-    if turning(pattern) != 1:
+    if pattern.turning != 1:
         return spacing(pattern, pattern.theta)
     centers = pattern.centers(pattern.theta)
     apart = torch.cdist(centers, centers).fill_diagonal_(math.inf).amin(1)

@@ -6,24 +6,23 @@ differ. Imports neither torch nor numpy: `p3i synth --help` reads this file.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from p3i.errors import SketchError, UsageError
 from p3i.grammar.ast import Program
 from p3i.grammar.sketch import Sketch
-from p3i.records import check_focal, told
+from p3i.records import Spelt, check_focal, told
 
 Structure = Literal["auto", "lattice", "circular", "hybrid"]
 Extent = Literal["found", "image"]
 Recipe = Literal["p3i", "paper"]
 
-STRUCTURES: tuple[Structure, ...] = ("auto", "lattice", "circular", "hybrid")
+STRUCTURES: tuple[Structure, ...] = get_args(Structure)
 MOST_K1 = 0.4
 """Beyond this radial distortion no photo lens goes (p3i/interp/lens.py)."""
 
-DEVICES: tuple[str, ...] = ("auto", "cpu")
-EXTENTS: tuple[Extent, ...] = ("found", "image")
-RECIPES: tuple[Recipe, ...] = ("p3i", "paper")
+EXTENTS: tuple[Extent, ...] = get_args(Extent)
+RECIPES: tuple[Recipe, ...] = get_args(Recipe)
 FEATURES: tuple[str, ...] = ("oriented", "rgb", "lite0", "alexnet")
 """The names of p3i.vision.features.EXTRACTORS, repeated here so that `--help` need not load torch."""
 
@@ -38,26 +37,34 @@ class SearchConfig:
 
     structure: Annotated[Structure, "The kind of pattern to look for; auto tries all kinds."] = "auto"
     features: Annotated[
-        str, f"What parts of the photo are compared by: {', '.join(FEATURES)}, or several joined by +."
+        str,
+        f"What parts of the photo are compared by: {', '.join(FEATURES)}, or several joined by +.",
+        Spelt(metavar="NAME"),
     ] = "oriented"
     weights: Annotated[Path | None, "A file with the weights of the features (alexnet needs one)."] = None
     focal_mm: Annotated[
         float | Literal["auto"] | None,
         "35 mm-equivalent focal length, or auto: estimated from the pattern where that fixes it. "
         "By default that of the photo's EXIF data, else 35.",
+        Spelt("--focal", metavar="MM|auto"),
     ] = None
     lens: Annotated[
         float | Literal["auto"] | None,
         "Radial lens distortion k1 (below 0: barrel), or auto: estimated from the pattern. By default none.",
+        Spelt(metavar="K1|auto|none", none="none"),
     ] = None
     extent: Annotated[
         Extent, "Draw the objects that were found, or let the pattern fill the whole image, as in the paper."
     ] = "found"
     sketch: Annotated[
-        Sketch | None, "A program with holes to fill (??, ?name, ~start), instead of a search."
+        Sketch | None,
+        "A program with holes to fill (??, ?name, ~start), instead of a search.",
+        Spelt(metavar="FILE", read=str),
     ] = None
     start: Annotated[
-        Program | None, "A program to refine: camera and Draw move, bounds and guards stay, no search."
+        Program | None,
+        "A program to refine: camera and Draw move, bounds and guards stay, no search.",
+        Spelt(metavar="FILE", read=str),
     ] = None
     recipe: Annotated[
         Recipe,
@@ -65,17 +72,18 @@ class SearchConfig:
         "a grid of 2 units, gradient descent, features alexnet (with --weights) or else rgb, --extent image.",
     ] = "p3i"
     exhaustive_s: Annotated[
-        float | None, "Seconds to walk through sketches of no known family as well, the shortest first."
+        float | None,
+        "Seconds to walk through sketches of no known family as well, the shortest first.",
+        Spelt("--exhaustive", metavar="SECONDS"),
     ] = None
     strict: Annotated[bool, "Fit and print programs of the paper's Table 1 only."] = False
     seed: Annotated[int, "Seed of everything random; equal seeds give equal programs."] = 0
     time_s: Annotated[
-        float | None, "Seconds after which the best program so far is the answer; no limit by default."
+        float | None,
+        "Seconds after which the best program so far is the answer; no limit by default.",
+        Spelt("--time", metavar="SECONDS"),
     ] = None
-    top: Annotated[int, "How many candidates to report, the best first."] = 1
-    device: Annotated[
-        str, "Where to compute: auto or cpu; this version searches on the CPU, the fastest at these sizes."
-    ] = "auto"
+    top: Annotated[int, "How many candidates to report, the best first.", Spelt(metavar="K")] = 1
     threads: Annotated[int, "Threads to compute with; one is fastest at these sizes."] = 1
 
     def __post_init__(self) -> None:
@@ -89,7 +97,6 @@ class SearchConfig:
         for part in parts:
             _one_of("features", part, FEATURES)
         _one_of("extent", self.extent, EXTENTS)
-        _one_of("device", self.device, DEVICES)
         self._check_asked()
         if isinstance(self.focal_mm, str):
             _one_of("the focal length, where no number,", self.focal_mm, ("auto",))

@@ -14,7 +14,7 @@ from p3i.interp.camera import project
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling
 from p3i.search.patches import Frames, find_objects, frames, patch_contrast, spacing
-from p3i.search.register import robust_fit
+from p3i.search.robust import robust_fit
 from p3i.search.score import mean_contrast, score_of_curve
 
 FOCALS_MM = (20.0, 80.0)

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from p3i.interp.compile import compile
-from p3i.search.session import Answer
+from p3i.search.answer import Answer
 from p3i.size import Size
 from p3i.vision.warp import in_frame
 

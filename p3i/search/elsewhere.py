@@ -14,12 +14,13 @@ import torch
 
 from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
+from p3i.search.answer import Answer
 from p3i.search.cells import sample_points
 from p3i.search.evidence import Evidence
 from p3i.search.grow import Fit
 from p3i.search.region import centers_px, region_px
 from p3i.search.result import NEEDED
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 
 # A fit lies elsewhere where at most this share of its cells falls into the answer's region.
 _MOST_INSIDE = 0.3

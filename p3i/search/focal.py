@@ -27,8 +27,8 @@ from p3i.interp.camera import Camera, project, rotation
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
 from p3i.search.result import FOCAL_REASONS, FocalSource
-from p3i.search.session import Answer
 from p3i.size import Size
 from p3i.vision.warp import in_frame
 

@@ -16,7 +16,9 @@ from torch import Tensor
 from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import HALF_STEPS, agreement, contrast, mean_cell, read_cells, sample_grid
+from p3i.search.correlate import find_instances
 from p3i.search.evidence import Evidence, Level
+from p3i.search.guess import Proposal, tilted
 from p3i.search.lattice import (
     PHASE,
     Lattice,
@@ -25,9 +27,8 @@ from p3i.search.lattice import (
     cells_in_view,
     map_from_index,
 )
-from p3i.search.propose.lattice import Proposal, tilted
 from p3i.search.refine import refine
-from p3i.search.register import find_instances, fit_instances
+from p3i.search.robust import fit_instances
 
 # A cell belongs to the pattern where the others predict it this much better than at half steps; the same
 # figure is taken off before cells are summed, so that many doubtful cells make no pattern.

@@ -10,13 +10,14 @@ import numpy as np
 import torch
 
 from p3i.grammar.leaves import leaves, with_leaves
+from p3i.search.answer import Answer
 from p3i.search.choose import explained_bits
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, filling_of
 from p3i.search.patches import spacing
 from p3i.search.propose.hybrid import BaseRing, HybridProposal, ring_repeated, rings_around
 from p3i.search.rings import answer_of, found_rings, numbers_of, values_of
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 
 # A ring that is less sure than this starts nothing.
 _LEAST_QUALITY = 0.15

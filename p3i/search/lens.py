@@ -19,12 +19,13 @@ from p3i.interp.camera import project
 from p3i.interp.compile import compile
 from p3i.interp.lens import photo_from_straight
 from p3i.interp.pattern import Pattern, moving_leaves
+from p3i.search.answer import Answer
 from p3i.search.config import MOST_K1
 from p3i.search.evidence import Evidence
 from p3i.search.patches import find_objects, frames, spacing
 from p3i.search.refine import free_numbers
-from p3i.search.register import robust_fit
-from p3i.search.session import Answer, Session
+from p3i.search.robust import robust_fit
+from p3i.search.session import Session
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.warp import in_frame, pixel_grid, remapped

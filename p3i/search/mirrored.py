@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves
 from p3i.interp.camera import Camera
+from p3i.search.answer import Answer
 from p3i.search.curves import CurveFit, measured, registered
 from p3i.search.evidence import Evidence
 from p3i.search.fill import Filling, fillings, start_values, unknowns_of, whole_program_sketch
 from p3i.search.rings import numbers_of, values_of
-from p3i.search.session import Answer
 from p3i.size import Size
 
 Array = NDArray[np.float64]

@@ -11,12 +11,13 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.pattern import Pattern
 from p3i.search.cells import sample_points
+from p3i.search.correlate import find_instances
 from p3i.search.evidence import Evidence, Level
 from p3i.search.extent import find_extent
 from p3i.search.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.phase import find_phase
-from p3i.search.register import find_instances, fit_instances
+from p3i.search.robust import fit_instances
 from p3i.search.score import MOST_JUDGED, judged_contrast, judging_features, score_of
 from p3i.vision.warp import in_frame
 

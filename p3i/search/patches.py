@@ -16,13 +16,11 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from p3i.grammar.ast import Polar
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
-from p3i.interp.unroll import nest
 from p3i.search.cells import HALF_STEPS, Cells, Contrast, contrast_of
+from p3i.search.correlate import Instances, correlate, mean_of_others
 from p3i.search.evidence import ColourMap, Evidence
-from p3i.search.register import Instances, correlate, mean_of_others
 from p3i.vision.warp import sample, sample_valid
 
 SIDE = 14
@@ -77,19 +75,10 @@ def spacing(pattern: Pattern, theta: Tensor) -> float:
     return float(finite.median()) if len(finite) else 1.0
 
 
-def turning(pattern: Pattern) -> int | None:
-    """The loop variable that goes round a curve, 0 for i and 1 for j; None where draws stand in rows."""
-    draw = nest(pattern.program).draw
-    for form in (draw.x, draw.y):
-        if isinstance(form, Polar):
-            return 1 if form.angle.j != 0 else 0
-    return None
-
-
 def frames(pattern: Pattern, theta: Tensor, index: Tensor, *, side: float) -> Frames:
     """The patches of `side` program units about `index` [N, 2]."""
     origin = pattern.points_at(index, theta)
-    variable = turning(pattern)
+    variable = pattern.turning
     if variable is None:
         along = torch.tensor([side, 0.0], dtype=torch.float64).expand_as(origin)
     else:

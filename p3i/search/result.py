@@ -3,7 +3,6 @@
 Imports neither torch nor numpy.
 """
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -103,7 +102,3 @@ class SynthesisResult:
         ):
             return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
         return self.stop.value
-
-    def _repr_html_(self) -> str:
-        """What notebooks show. Looked up by name: the search does not know who draws."""
-        return importlib.import_module("p3i.notebook").result_html(self)

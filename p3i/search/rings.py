@@ -7,12 +7,13 @@ import numpy as np
 import torch
 
 from p3i.interp.camera import Camera
+from p3i.search.answer import Answer
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.fill import Filling, filling_of
 from p3i.search.propose.ring import RingProposal, ring_proposals
 from p3i.search.result import StructureFound
 from p3i.search.sector import Place, Ring, places
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 
 # So many proposals are fitted, and so many fits are finished.
 _MOST_FITTED = 8

@@ -16,7 +16,7 @@ from p3i.search.evidence import FINE, Evidence, Level
 from p3i.search.lens import scaled, straightened
 from p3i.search.patches import half_steps, patch_contrast, spacing
 from p3i.vision.image import Image
-from p3i.vision.threads import limit_threads
+from p3i.vision.threads import limited_threads
 from p3i.vision.warp import in_frame, sample, sample_valid
 
 MOST_JUDGED = 600
@@ -51,7 +51,12 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
     The focal is that of the options, else the program's header, else the photo, else 35 mm; the lens is that
     of the header. Raises ProgramError where fewer than two of the program's objects lie in the photo.
     """
-    limit_threads(config.threads)
+    with limited_threads(config.threads):
+        return _evaluated(image, program, config)
+
+
+def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluation:
+    """`evaluate`, however many threads there are."""
     header = program.header.focal_mm if program.header is not None else None
     given = None if config.focal_mm == "auto" else config.focal_mm
     focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)

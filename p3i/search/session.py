@@ -2,16 +2,14 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import torch
 
-from p3i.grammar.ast import Program
-from p3i.grammar.printer import format_program
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
-from p3i.search.result import StopReason, StructureFound
+from p3i.search.result import StopReason
 
 Progress = Callable[[str, float], None]
 Trace = Callable[[Mapping[str, Any]], None]
@@ -66,30 +64,6 @@ class Session:
             self.progress(doing, share)
 
     def record(self, step: str, **facts: Any) -> None:
-        """Write one step of the search into the trace; a `program` is written as its text."""
-        if self.trace is None:
-            return
-        program = facts.get("program")
-        if isinstance(program, Program):
-            facts["program"] = format_program(replace(program, header=None))
-        self.trace({"step": step, **facts})
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Answer:
-    """A finished program for the photo.
-
-    `score` says how sure it is (0..1, comparable between photos), `worth` how much of this photo it explains
-    (comparable between programs for one photo). `focal_mm` is the focal that the program is told with, None
-    where it is the one assumed; then `focal_reason` may say why no other was found. `lens_k1` is the radial
-    distortion of the photo that the program holds on (p3i/interp/lens.py), None for a pinhole camera.
-    """
-
-    program: Program
-    structure: StructureFound
-    score: float
-    worth: float
-    notes: tuple[str, ...] = ()
-    focal_mm: float | None = None
-    focal_reason: str = ""
-    lens_k1: float | None = None
+        """Write one step of the search into the trace."""
+        if self.trace is not None:
+            self.trace({"step": step, **facts})

@@ -16,6 +16,7 @@ from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch
 from p3i.interp.compile import compile
 from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
 from p3i.search.borrowed import written_in
 from p3i.search.centring import centred, standing_out
 from p3i.search.climb import Found, distinct, search_grid
@@ -32,7 +33,7 @@ from p3i.search.fill import (
 from p3i.search.patches import half_steps, patch_contrast
 from p3i.search.result import StructureFound
 from p3i.search.score import normalised_score
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,12 @@ register.py), and `Answer`, whose scores are comparable between families.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from p3i.search.answer import Answer
 from p3i.search.hybrids import find_hybrids
 from p3i.search.lattices import find_lattices
 from p3i.search.result import StructureFound
 from p3i.search.rings import find_rings
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,15 @@
 """Photo -> program: the whole search, from what may be looked at to the answer or the reason for none."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from p3i.grammar.ast import Program
+from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
+from p3i.search.answer import Answer
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
 from p3i.search.choose import by_explained
 from p3i.search.config import SearchConfig
@@ -20,10 +26,10 @@ from p3i.search.result import (
     StopReason,
     SynthesisResult,
 )
-from p3i.search.session import TRACE_VERSION, Answer, Progress, Session, Trace
+from p3i.search.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.sketches import FAMILIES
 from p3i.vision.image import Image
-from p3i.vision.threads import limit_threads
+from p3i.vision.threads import limited_threads
 
 # Pictures below this many pixels a side, or with less than this share known, are not searched.
 _LEAST_SIDE = 32
@@ -46,7 +52,14 @@ def synthesize(
     The result's `program` is None where nothing reaches the score NEEDED; then `stop` and `score` say why.
     The program has no header yet. A KeyboardInterrupt ends the search with the best that was found.
     """
-    limit_threads(config.threads)
+    with limited_threads(config.threads):
+        return _searched(image, config, progress, trace)
+
+
+def _searched(
+    image: Image, config: SearchConfig, progress: Progress | None, trace: Trace | None
+) -> SynthesisResult:
+    """`synthesize`, however many threads there are."""
     assumed = focal_of(image, config)
     focal_mm, _ = assumed
 
@@ -58,7 +71,7 @@ def synthesize(
     if hopeless is not None:
         return result(None, hopeless)
     check_asked(config, image.size)
-    session = Session(Evidence(image, config, focal_mm), config, progress, trace)
+    session = Session(Evidence(image, config, focal_mm), config, progress, trace and _in_text(trace))
     width, height = image.size.width, image.size.height
     session.record("photo", width=width, height=height, focal=focal_mm, version=TRACE_VERSION)
     answers = _found(session) if config.lens is None else find_with_lens(session, _found)
@@ -129,6 +142,17 @@ def _found(session: Session) -> list[Answer]:
     except KeyboardInterrupt:
         session.stopped = StopReason.INTERRUPTED
     return by_explained(session.evidence, answers, needed=needed_for(session.config))
+
+
+def _in_text(trace: Trace) -> Trace:
+    """A trace that is told programs, for one that takes their text."""
+
+    def told(step: Mapping[str, Any]) -> None:
+        program = step.get("program")
+        text = format_program(replace(program, header=None)) if isinstance(program, Program) else program
+        trace({**step, "program": text} if "program" in step else step)
+
+    return told
 
 
 def _mirrored(session: Session, answer: Answer) -> Camera | None:

@@ -1,7 +1,7 @@
 """The cells of a lattice as vectors: features of a sheet, a robust median cell, agreement with it.
 
 Convention: a *sheet* is a photo in lattice coordinates (p3i.vision.sheet). Cells are cut from it as
-arrays [N, C, side, side], N running over rows then columns of the box; `seen` [N, side, side] says which
+arrays [N, C, n, n], n = `side`, N running over rows then columns of the box; `seen` [N, n, n] says which
 samples are known. Agreement is a correlation of local gradient orientation and colour, free in gain and
 offset of the light, 1 for equal cells, about 0 for unrelated ones. Arrays in, arrays out.
 """
@@ -60,7 +60,7 @@ def sheet_features(sheet: Sheet) -> tuple[Floats, Mask]:
 
 
 def _normalised(values: Floats, seen: Mask, side: int) -> Floats:
-    """Values over the root of their local energy plus half of the global one."""
+    """Values [C, H, W] over the root of their local energy plus half of the global one."""
     energy = (values * values).sum(axis=0, keepdims=True) * seen
     everywhere = float(energy.sum() / max(seen.sum(), 1))
     local = masked_mean(energy, seen, 3 * side)
@@ -68,7 +68,7 @@ def _normalised(values: Floats, seen: Mask, side: int) -> Floats:
 
 
 def cut(values: NDArray, side: int) -> NDArray:
-    """Cells [N, C, side, side] of a sheet [C, rows*side, columns*side]; [N, side, side] of a sheet [H, W]."""
+    """Cells [N, C, n, n] of a sheet [C, rows*side, columns*side]; [N, n, n] of a sheet [H, W]."""
     *head, height, width = values.shape
     grid = values.reshape(*head, height // side, side, width // side, side)
     if head:
@@ -77,7 +77,7 @@ def cut(values: NDArray, side: int) -> NDArray:
 
 
 def weighted_mean(cells: Floats, seen: Mask, weights: NDArray) -> Floats:
-    """Mean cell [C, side, side] of cells [N, C, side, side] by weights [N], over what is seen."""
+    """Mean cell [C, n, n] of cells [N, C, n, n] by weights [N], over what is seen."""
     flat = cells.reshape(len(cells), -1)
     total = weights.astype(np.float32) @ flat
     known = weights.astype(np.float32) @ seen.reshape(len(seen), -1).astype(np.float32)
@@ -87,7 +87,7 @@ def weighted_mean(cells: Floats, seen: Mask, weights: NDArray) -> Floats:
 
 
 def median_cell(cells: Floats, seen: Mask, chosen: NDArray, *, most: int = 150) -> tuple[Floats, Floats]:
-    """Median cell [C, side, side] of the chosen ones (indices) and the median absolute deviation from it."""
+    """Median cell [C, n, n] of the chosen ones (indices) and the median absolute deviation from it."""
     if len(chosen) > most:
         chosen = chosen[np.linspace(0, len(chosen) - 1, most).astype(int)]
     some = np.where(seen[chosen][:, None], cells[chosen], np.nan)
@@ -98,7 +98,10 @@ def median_cell(cells: Floats, seen: Mask, chosen: NDArray, *, most: int = 150) 
 
 
 def _nanmedian(values: NDArray) -> NDArray:
-    """Median over the first axis of what is not nan; 0 where nothing is known (np.nanmedian would warn)."""
+    """Median [...] over the first axis of [N, ...] of what is not nan; 0 where nothing is known.
+
+    np.nanmedian would warn of that.
+    """
     ordered = np.sort(values, axis=0)
     known = np.isfinite(ordered).sum(axis=0)
     low = np.take_along_axis(ordered, np.maximum((known - 1) // 2, 0)[None], axis=0)[0]
@@ -107,12 +110,12 @@ def _nanmedian(values: NDArray) -> NDArray:
 
 
 def shifted(template: Floats, shifts: NDArray) -> Floats:
-    """The template [C, side, side] rolled by whole samples (x, y) of shifts [S, 2]: [S, C, side, side]."""
+    """The template [C, n, n] rolled by whole samples (x, y) of shifts [S, 2]: [S, C, n, n]."""
     return np.stack([np.roll(template, (int(y), int(x)), axis=(1, 2)) for x, y in shifts])
 
 
 def agreement(cells: Floats, seen: Mask, templates: Floats) -> Floats:
-    """Correlation [N, S] of cells [N, C, k, k] with templates [S, C, k, k], over what is seen of a cell.
+    """Correlation [N, S] of cells [N, C, n, n] with templates [S, C, n, n], over what is seen of a cell.
 
     A cell emptier than the template does not gain from its normalisation: its energy counts as at least
     a share of the template's.

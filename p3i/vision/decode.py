@@ -63,10 +63,7 @@ def decode(data: bytes, *, name: str, max_px: int) -> Decoded:
     """
     if not data:
         raise FileError(f"{name} is empty (0 bytes)")
-    cv2.utils.logging.setLogLevel(
-        cv2.utils.logging.LOG_LEVEL_SILENT
-    )  # its warnings about odd tags go straight to stderr, past our own messages
-    with _own_pixel_limit():
+    with _own_pixel_limit(), _silent_opencv():
         try:
             return _decode(data, name=name, max_px=max_px)
         except FileError:
@@ -195,15 +192,17 @@ def _is_deep(picture: Pil.Image, data: bytes) -> bool:
     """Whether Pillow would cut the picture down to 8 bits."""
     if picture.format == "PNG":
         return len(data) > 24 and data[24] == 16
-    if picture.format == "TIFF" and data[2:4] in (b"*\0", b"\0*"):  # BigTIFF is left to Pillow
+    if picture.format == "TIFF":
         tags = picture.tag_v2  # pyright: ignore[reportAttributeAccessIssue]
+        if data[2:4] not in (b"*\0", b"\0*") and tags.get(ORIENTATION, 1) != 1:
+            return False  # a turned BigTIFF is left to Pillow: OpenCV would turn it too
         depths = tags.get(258, (1,))
         return max(depths if isinstance(depths, tuple) else (depths,)) > 8 and tags.get(262) in (0, 1, 2)
     return False
 
 
 def _opencv_array(data: bytes) -> np.ndarray | None:
-    """The picture as OpenCV reads it, channels in RGB order, as stored (not turned); None if it cannot."""
+    """The picture as OpenCV reads it, [H, W(, C)] in RGB order, as stored (not turned); None if it cannot."""
     data = _without_tiff_orientation(data)
     array = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if array is not None and array.ndim == 3 and array.shape[2] >= 3:
@@ -311,6 +310,17 @@ def _own_pixel_limit() -> Iterator[None]:
             yield
     finally:
         Pil.MAX_IMAGE_PIXELS = before
+
+
+@contextmanager
+def _silent_opencv() -> Iterator[None]:
+    """OpenCV's warnings about odd tags go straight to stderr, past our own messages: not while we decode."""
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(before)
 
 
 def _frames_note(picture: Pil.Image) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ class FeatureMap:
 
     @property
     def map_from_photo(self) -> Tensor:
-        """The 3 x 3 matrix (float64) that takes photo pixels to map pixels."""
+        """The matrix [3, 3] (float64) that takes photo pixels to map pixels."""
         shift = 0.5 / self.stride - 0.5
         scale = 1 / self.stride
         rows = [[scale, 0, shift], [0, scale, shift], [0, 0, 1]]

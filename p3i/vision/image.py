@@ -127,6 +127,7 @@ def resized(image: Image, longer: int) -> Image:
 
 
 def _area_mean(array: np.ndarray, scale: float) -> np.ndarray:
+    """An array [H, W(, C)] reduced `scale` times on both axes, each pixel the mean of its area."""
     # With fx and fy OpenCV keeps the scale exact; with a target size it would stretch the shorter side.
     # A side that would round to 0 keeps one pixel.
     height, width = array.shape[:2]

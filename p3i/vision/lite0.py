@@ -83,7 +83,10 @@ def forward(colours: Tensor, folded: dict[str, tuple[Tensor, Tensor]]) -> Tensor
 def fold(
     weight: Tensor, scale: Tensor, bias: Tensor, mean: Tensor, variance: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """A convolution's weight with the batch norm that follows it put in: weight and bias."""
+    """A convolution's weight with the batch norm that follows it put in: weight and bias.
+
+    Shapes: weight [C, c, h, w] of C channels from c, the others [C].
+    """
     factor = scale / torch.sqrt(variance + _BATCH_NORM_EPSILON)
     return weight * factor[:, None, None, None], bias - mean * factor
 

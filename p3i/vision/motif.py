@@ -22,14 +22,17 @@ _VOTE_WIDTH = 0.08  # of a period
 
 
 def offsets(n: int) -> tuple[Array, Array]:
-    """Distance (x, y) of each sample of an n x n torus from sample (0, 0), in periods: -0.5 to 0.5."""
+    """Distance (x [n, n], y [n, n]) of each sample of a torus from sample (0, 0), in periods: -0.5 to 0.5."""
     line = ((np.arange(n) + n // 2) % n - n // 2) / n
     x, y = np.meshgrid(line, line)
     return x, y
 
 
 def correlate(values: NDArray, kernel: NDArray) -> Array:
-    """sum over p of values(q + p) kernel(p) at each q of the torus; the kernel's middle is sample (0, 0)."""
+    """sum over p of values(q + p) kernel(p) at each q of the torus; the kernel's middle is sample (0, 0).
+
+    Shapes: values [n, n], kernel [n, n] -> [n, n].
+    """
     return np.real(np.fft.ifft2(np.fft.fft2(values) * np.conj(np.fft.fft2(kernel))))
 
 
@@ -72,6 +75,7 @@ def parts(appearance: Floats) -> Array:
 
     What wraps round the torus is ground (a wall, a sheet of paper); what does not is a thing. Each part
     votes by the contrast along its outline, at every threshold at which it exists.
+    Shapes: appearance [C, n, n] -> [n, n].
     """
     n = appearance.shape[1]
     votes = np.zeros((n, n))

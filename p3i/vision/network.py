@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from p3i.errors import FileError
+from p3i.files import read_bytes
 from p3i.vision.fill import eroded
 
 
@@ -19,13 +20,7 @@ def load_weights(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> dict[str,
     The file is loaded as data only (weights_only=True): it cannot run code. Raises FileError where it is
     missing, no state dict, or has an entry missing or of another shape.
     """
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise FileError(f"there is no weight file {path}") from None
-    except OSError as error:
-        raise FileError(f"the weight file {path} cannot be read: {error.strerror}") from None
-    return tensors_of(data, shapes, name=str(path))
+    return tensors_of(read_bytes(path), shapes, name=str(path))
 
 
 def tensors_of(data: bytes, shapes: Mapping[str, tuple[int, ...]], *, name: str) -> dict[str, Tensor]:

@@ -79,7 +79,10 @@ def principal(values: Tensor, valid: Tensor, channels: int) -> Tensor:
 
 
 def unit_energy(values: Tensor, valid: Tensor) -> Tensor:
-    """The map scaled so that the mean of |F|^2 over its known pixels is 1, 0 elsewhere; flat maps stay 0."""
+    """The map scaled so that the mean of |F|^2 over its known pixels is 1, 0 elsewhere; flat maps stay 0.
+
+    Shapes: values [C, H, W], valid [H, W] bool -> [C, H, W].
+    """
     known = values * valid
     energy = float(known.square().sum(dtype=torch.float64)) / max(1, int(valid.sum()))
     return known / energy**0.5 if energy > 1e-12 else torch.zeros_like(values)

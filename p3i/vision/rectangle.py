@@ -67,7 +67,10 @@ def _cells(points: NDArray[np.bool_], columns: int, rows: int) -> NDArray[np.boo
 
 
 def _grown(known: Known, low: Array, high: Array, *, step: Array) -> tuple[Array, Array]:
-    """The rectangle with each side moved outwards, by ever smaller steps, while all it takes in is known."""
+    """The rectangle (low [2], high [2]) with each side moved outwards while all it takes in is known.
+
+    The moves grow ever smaller, from `step` [2].
+    """
     low, high = low.copy(), high.copy()
     for halving in range(1, 11):
         for axis in (0, 1):

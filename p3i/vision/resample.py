@@ -44,9 +44,9 @@ def resample(
     size: Size,
     bits: int = 8,
 ) -> tuple[NDArray, NDArray | None]:
-    """The view of `size`: whole numbers of `bits` (8 or 16) [H, W, 3], and their alpha [H, W].
+    """The view of `size`: whole numbers of `bits` (8 or 16) [h, w, 3], and their alpha [h, w].
 
-    `pixels` [h, w, 3] and `alpha` [h, w] (None: all known) are in 0..1, alpha is plain. The view's alpha is 0
+    `pixels` [H, W, 3] and `alpha` [H, W] (None: all known) are in 0..1, alpha is plain. The view's alpha is 0
     where the map leads to nothing, and the colours are 0 there; it is None where everything is known.
     """
     top = 2**bits - 1
@@ -166,13 +166,13 @@ def _reach(count: int) -> int:
 
 
 def _finer(start: int, length: int, count: int) -> NDArray[np.float64]:
-    """The places of `count` samples a pixel, the filter's reach included; every pixel's centre is one."""
+    """The places [N] of `count` samples a pixel, the filter's reach included; every pixel's centre is one."""
     reach = _reach(count)
     return start + (np.arange(length * count + 2 * reach) - reach) / count
 
 
 def _sinc(count: int) -> NDArray[np.float32]:
-    """A Lanczos kernel that lets pass what `count` times fewer samples can hold; odd in length, sum 1."""
+    """A Lanczos kernel [N] that lets pass what `count` times fewer samples can hold; odd in length, sum 1."""
     if count == 1:
         return np.ones(1, np.float32)
     place = np.arange(-_LOBES * count + 1, _LOBES * count) / count
@@ -189,7 +189,7 @@ def _halvings(points: Points, size: Size) -> int:
 
 
 def _halved(source: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Half the size, each pixel the mean of four; an odd side is lengthened by its last pixel."""
+    """[H, W, C] at half the size, each pixel the mean of four; an odd side repeats its last pixel."""
     height, width = source.shape[:2]
     if height % 2 or width % 2:
         source = np.asarray(

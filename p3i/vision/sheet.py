@@ -91,7 +91,7 @@ def cell_sides_px(image_from_cells: NDArray, points: NDArray) -> tuple[Array, Ar
 def visible_box(
     image_from_cells: Array, shape: tuple[int, int], *, min_px: float = 4.0, max_cells: int = 6000
 ) -> Box | None:
-    """The box of all cells that show in a photo of `shape` (height, width) at `min_px` or more a side.
+    """The box of all cells that show in a photo of `shape` [H, W] at `min_px` or more a side.
 
     Where the box would hold more than `max_cells` (towards a horizon), `min_px` is raised until it does not.
     None where nothing shows.

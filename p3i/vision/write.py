@@ -1,11 +1,8 @@
 """Pictures -> files: whole or not at all, and never over something that is there."""
 
-import errno
 import io
 import os
 import struct
-import sys
-import tempfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,8 +12,10 @@ import numpy as np
 from PIL import Image as Pil
 
 from p3i.errors import FileError, UsageError
+from p3i.files import write_bytes as write_bytes
 from p3i.vision.decode import swap_red_blue
 from p3i.vision.exif import upright_exif
+from p3i.vision.tiff import encode_tiff_16
 
 # Suffix -> Pillow's name of the format.
 _FORMATS = {
@@ -64,60 +63,6 @@ def write_image(
     write_bytes(path, data, force=force)
 
 
-def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = False) -> None:
-    """Write bytes to a file or standard output (`-`): whole or not at all, over nothing unless `force`.
-
-    Raises FileError where the file exists (without `force`), is a folder, or cannot be written.
-    """
-    if os.fspath(path) == "-":
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-        return
-    target = Path(path)
-    try:
-        if target.is_dir():
-            raise FileError(f"{target} is a folder: name a file in it")
-        if target.exists() and not target.is_file():
-            # A device or a pipe (/dev/null): there is nothing to replace, and a rename would destroy it.
-            target.write_bytes(data)
-        else:
-            _write_beside_and_rename(target, data, force=force)
-    except FileNotFoundError:
-        raise FileError(f"there is no folder {target.parent} to write {target.name} into") from None
-    except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it
-        reason = error.strerror if isinstance(error, OSError) else None
-        raise FileError(f"{target} cannot be written: {reason or error}") from None
-
-
-def _write_beside_and_rename(target: Path, data: bytes, *, force: bool) -> None:
-    """Write a file in one step; FileError where it exists (without `force`), OSError as the system says."""
-    place = target.resolve()  # through a link, so that the link stays one
-    if not force and place.exists():
-        raise FileError(f"{target} exists already: name another file, or say --force")
-    handle, name = tempfile.mkstemp(prefix=f".{place.name[:40]}.", dir=place.parent)
-    beside = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        beside.chmod(_mode_of(place))
-        if force:
-            beside.replace(place)
-            return
-        # A link fails where a file has appeared since; a rename would replace it.
-        try:
-            os.link(beside, place)
-        except FileExistsError:
-            raise FileError(f"{target} exists already: name another file, or say --force") from None
-        except PermissionError:  # file systems without hard links say so
-            beside.replace(place)
-        except OSError as error:
-            if error.errno not in (errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
-                raise
-            beside.replace(place)
-    finally:
-        beside.unlink(missing_ok=True)
-
-
 def encode(
     pixels: np.ndarray,
     *,
@@ -129,7 +74,7 @@ def encode(
     text: Mapping[str, str] | None = None,
     dpi: float | None = None,
 ) -> bytes:
-    """The bytes of a picture file of `kind` (a suffix such as ".png"); the rest as in `write_image`."""
+    """The bytes of a picture file of `kind` (".png") of pixels [H, W, 3]; the rest as in `write_image`."""
     name = _FORMATS.get(kind.lower())
     if name is None:
         known = ", ".join(_FORMATS)
@@ -149,7 +94,7 @@ def encode(
     if name == "PNG":
         return _png(array, icc=icc, exif=exif, text=text or {}, dpi=dpi)
     if bits == 16:
-        return _tiff_16(array, icc=icc, dpi=dpi)
+        return encode_tiff_16(array, icc=icc, exif=exif, dpi=dpi)
     picture = Pil.fromarray(array)
     options: dict[str, object] = {"quality": _JPEG_QUALITY} if name in ("JPEG", "WEBP") else {}
     if name == "TIFF":
@@ -188,46 +133,8 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
-def _tiff_16(array: np.ndarray, *, icc: bytes | None, dpi: float | None) -> bytes:
-    """A plain one-strip TIFF of uint16 [H, W, 3 or 4]: Pillow and OpenCV write none with a profile."""
-    height, width, channels = array.shape
-    strip = np.ascontiguousarray(array.astype("<u2")).tobytes()
-    short, long, rational, undefined = 3, 4, 5, 7
-    tags: list[tuple[int, int, int, bytes]] = [
-        (256, long, 1, struct.pack("<I", width)),
-        (257, long, 1, struct.pack("<I", height)),
-        (258, short, channels, struct.pack(f"<{channels}H", *[16] * channels)),
-        (259, short, 1, struct.pack("<H", 1)),  # not compressed
-        (262, short, 1, struct.pack("<H", 2)),  # RGB
-        (273, long, 1, struct.pack("<I", 8)),  # the strip follows the header
-        (277, short, 1, struct.pack("<H", channels)),
-        (278, long, 1, struct.pack("<I", height)),
-        (279, long, 1, struct.pack("<I", len(strip))),
-    ]
-    if dpi:
-        per_inch = struct.pack("<II", round(dpi * 1000), 1000)
-        tags += [(282, rational, 1, per_inch), (283, rational, 1, per_inch)]
-        tags.append((296, short, 1, struct.pack("<H", 2)))  # inches
-    if channels == 4:
-        tags.append((338, short, 1, struct.pack("<H", 2)))  # the fourth channel is plain alpha
-    if icc:
-        tags.append((34675, undefined, len(icc), icc))
-    directory_at = 8 + len(strip) + len(strip) % 2
-    overflow_at = directory_at + 2 + 12 * len(tags) + 4
-    entries, overflow = b"", b""
-    for tag, kind, count, value in tags:
-        if len(value) > 4:
-            place = struct.pack("<I", overflow_at + len(overflow))
-            overflow += value + b"\0" * (len(value) % 2)
-        else:
-            place = value.ljust(4, b"\0")
-        entries += struct.pack("<HHI", tag, kind, count) + place
-    head = b"II*\0" + struct.pack("<I", directory_at)
-    directory = struct.pack("<H", len(tags)) + entries + struct.pack("<I", 0)
-    return head + strip + b"\0" * (len(strip) % 2) + directory + overflow
-
-
 def _opencv_bytes(suffix: str, array: np.ndarray) -> bytes:
+    """The file that OpenCV makes of [H, W, 3 or 4] RGB(A)."""
     done, buffer = cv2.imencode(suffix, swap_red_blue(array))
     if not done:
         raise FileError(f"OpenCV could not encode a {array.shape[1]} x {array.shape[0]} {suffix} picture")
@@ -235,7 +142,7 @@ def _opencv_bytes(suffix: str, array: np.ndarray) -> bytes:
 
 
 def _quantized(values: np.ndarray, bits: int) -> np.ndarray:
-    """Float in 0..1, uint8 or uint16 -> unsigned integers of `bits`."""
+    """Float in 0..1, uint8 or uint16 [H, W, C] -> unsigned integers of `bits`, likewise."""
     if values.dtype == np.uint8:
         return values if bits == 8 else values.astype(np.uint16) * 257
     if values.dtype == np.uint16:
@@ -243,12 +150,3 @@ def _quantized(values: np.ndarray, bits: int) -> np.ndarray:
     top = 2**bits - 1
     rounded = np.rint(np.clip(np.nan_to_num(values), 0, 1) * top)
     return rounded.astype(np.uint8 if bits == 8 else np.uint16)
-
-
-def _mode_of(place: Path) -> int:
-    """The permissions that the file has, or that a new one would get."""
-    if place.exists():
-        return place.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import click
@@ -52,9 +53,38 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         assert name in shown and entry.summary in shown
 
 
-def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--version"]) == 0
+@pytest.mark.parametrize("word", ["--version", "-V"])
+def test_version_is_printed(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([word]) == 0
     assert capsys.readouterr().out == f"p3i {__version__}\n"
+
+
+def test_python_dash_m_is_the_command_line(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "p3i", "check", "missing.p3p"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 3 and done.stderr.startswith("error: ")
+    assert "missing.p3p" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("p3i sy", {"synth"}), ("p3i synth --structure c", {"circular"})]
+)
+def test_the_shell_completes_commands_and_choices(typed: str, offered: set[str]) -> None:
+    asked = {"_P3I_COMPLETE": "bash_complete", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+    done = subprocess.run(
+        [sys.executable, "-m", "p3i.cli.main"],
+        env={**os.environ, **asked},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert {line.rpartition(",")[2] for line in done.stdout.split()} == offered
 
 
 def test_no_words_print_the_help_and_count_as_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,8 +20,6 @@ from p3i.cli.main import COMMANDS
 PACKAGE = Path(__file__).parents[2] / "p3i"
 # What a record of options is called where it is used.
 RECEIVERS = {"options", "asked", "config"}
-# The option goes with the field, in the files of `synth` and `eval`.
-GOING = {("SearchConfig", "device")}
 
 
 def tree_of(function: Callable[..., Any]) -> ast.FunctionDef:
@@ -135,4 +133,4 @@ def test_every_field_of_a_record_of_options_is_read_by_what_does_the_work(record
                     if holder in RECEIVERS:
                         read.add(name)
     fields = {field.name for field in dataclasses.fields(record)}
-    assert {name for name in fields - read if (record.__name__, name) not in GOING} == set()
+    assert fields - read == set()

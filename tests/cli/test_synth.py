@@ -14,19 +14,26 @@ import cv2
 import numpy as np
 import pytest
 
+import p3i
 from p3i.cli.main import run
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search.config import SearchConfig
 from p3i.search.result import FOCAL_REASONS, Candidate, StopReason, SynthesisResult
 
 # What the search is to do with a photo of this grey level.
-FINDS, FINDS_NOTHING, HAS_A_BUG, IS_INTERRUPTED, IS_LATE = 200, 0, 40, 80, 120
+FINDS, FINDS_NOTHING, HAS_A_BUG, IS_INTERRUPTED, IS_LATE, FINDS_A_RING = 200, 0, 40, 80, 120, 160
 
 
-def lattice(step: float) -> Program:
-    inner = Draw(x=Affine(step, 0, -30), y=Affine(0, step, -30))
+def lattice(step: float, start: float = -30) -> Program:
+    inner = Draw(x=Affine(step, 0, start), y=Affine(0, step, start))
     rows = For("j", Affine(), Affine(constant=4), inner)
     return Program(CameraPose(-31.2, 8.4), For("i", Affine(), Affine(constant=5), rows))
+
+
+def ring() -> Program:
+    """A program that Table 1 of the paper cannot spell."""
+    draw = "Draw(x=20*Cos(30*i) + 1, y=20*Sin(30*i) + 2)"
+    return p3i.loads(f"SetCameraPose(rx=0, ry=0)\nfor i in range(0, 12):\n    {draw}\n")
 
 
 class Search:
@@ -35,6 +42,8 @@ class Search:
     def __init__(self) -> None:
         self.configs: list[SearchConfig] = []
         self.images: list = []
+        self.meanwhile: Callable[..., object] = lambda image: None
+        """What happens elsewhere while the search is at it."""
 
     def synthesize(self, image, config, *, progress=None, trace=None) -> SynthesisResult:
         self.configs.append(config)
@@ -48,8 +57,14 @@ class Search:
             raise ZeroDivisionError("division by zero")
         if level == FINDS_NOTHING:
             return SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.12, needed=0.35)
+        self.meanwhile(image)
         stop = {IS_INTERRUPTED: StopReason.INTERRUPTED, IS_LATE: StopReason.TIME_UP}.get(level)
-        found = [Candidate(program=lattice(s), score=s / 100, structure="lattice") for s in (12.0, 6.0, 3.0)]
+        if level == FINDS_A_RING:
+            return SynthesisResult(program=ring(), stop=StopReason.FOUND, structure="circular", score=0.7)
+        start = 0 if config.strict else -30  # a coordinate of Table 1 has no constant
+        found = [
+            Candidate(program=lattice(s, start), score=s / 100, structure="lattice") for s in (12.0, 6.0, 3.0)
+        ]
         return SynthesisResult(
             program=found[0].program,
             stop=stop or StopReason.FOUND,
@@ -97,8 +112,6 @@ def test_the_program_of_a_photo_is_printed_with_its_header(photo, capsys) -> Non
 
 
 def test_the_printed_program_is_read_back_by_p3i(photo, capsys) -> None:
-    import p3i
-
     run(["synth", photo("a.png")])
     program = p3i.loads(capsys.readouterr().out)
     assert program == p3i.loads(p3i.format(program))
@@ -166,6 +179,54 @@ def test_errors_as_json_name_their_photo(photo, capsys) -> None:
         "error": "no regular pattern (best 0.12, needs 0.35)",
         "code": 5,
     }
+
+
+def test_a_program_that_cannot_be_printed_costs_no_other_photo(photo, capsys) -> None:
+    names = [photo("a.png"), photo("b.png", FINDS_A_RING), photo("c.png")]
+    assert run(["synth", "--strict", *names, "-o", "out/"]) == 6
+    assert sorted(path.name for path in Path("out").iterdir()) == ["a.p3p", "c.p3p"]
+    said = capsys.readouterr().err
+    assert said.startswith("error: b.png: ") and said.count("\n") == 1
+    assert run(["synth", "--strict", "b.png"]) == 4
+
+
+def test_an_answer_that_cannot_be_recorded_costs_no_other_photo(photo, capsys, monkeypatch) -> None:
+    from p3i.search import record
+
+    def failing(result, **rest):
+        raise ArithmeticError("a number nobody foresaw")
+
+    honest = record.answer_record
+    monkeypatch.setattr(
+        record,
+        "answer_record",
+        lambda result, **rest: (failing if result.structure == "circular" else honest)(result, **rest),
+    )
+    names = [photo("a.png"), photo("b.png", FINDS_A_RING), photo("c.png")]
+    assert run(["synth", *names, "-o", "out.jsonl"]) == 6
+    records = [json.loads(line) for line in Path("out.jsonl").read_text().splitlines()]
+    assert [one["program"] is None for one in records] == [False, True, False]
+    assert records[1]["code"] == 70 and "a number nobody foresaw" in records[1]["error"]
+
+
+def test_a_file_that_cannot_be_written_costs_no_other_photo(photo, search, capsys) -> None:
+    search.meanwhile = lambda image: Path("out/b.p3p").mkdir(exist_ok=True)
+    names = [photo("a.png"), photo("b.png"), photo("c.png")]
+    assert run(["synth", *names, "-o", "out/"]) == 6
+    assert sorted(path.name for path in Path("out").glob("*.p3p") if path.is_file()) == ["a.p3p", "c.p3p"]
+    assert "error: " in capsys.readouterr().err
+
+
+def test_an_interrupt_while_an_answer_is_written_keeps_those_before_it(photo, monkeypatch) -> None:
+    from p3i.cli import report
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(report, "line", interrupted)
+    names = [photo("a.png"), photo("b.png", FINDS_NOTHING), photo("c.png")]
+    assert run(["synth", *names, "-o", "out.jsonl"]) == 130
+    assert len(Path("out.jsonl").read_text().splitlines()) == 2
 
 
 def test_an_interrupt_prints_the_best_so_far_and_stops_the_batch(photo, search, capsys) -> None:
@@ -269,8 +330,6 @@ def test_top_prints_programs_one_after_another_each_under_its_score(photo, capsy
     assert run(["synth", "--top", "2", photo("a.png")]) == 0
     first, second = capsys.readouterr().out.split("# candidate 2 of 2: lattice, score 0.0600\n")
     assert first.startswith("# candidate 1 of 2: lattice, score 0.1200\n# /// p3p\n")
-    import p3i
-
     assert p3i.loads(first).world == lattice(12.0).world
     assert p3i.loads(second).world == lattice(6.0).world
     assert run(["synth", "--top", "2", "a.png", "-o", "b.p3p"]) == 0
@@ -295,7 +354,7 @@ def test_trace_writes_the_steps_of_each_photo(photo) -> None:
 def test_every_option_of_the_search_arrives_there(photo, search) -> None:
     photo("a.png")
     search_words = "--structure lattice --extent image --focal 28 --features rgb --strict --time 3.5"
-    words = shlex.split(f"{search_words} --top 2 --seed 7 --device cpu --threads 2 --format jsonl")
+    words = shlex.split(f"{search_words} --top 2 --seed 7 --threads 2 --format jsonl")
     assert run(["synth", "a.png", *words]) == 0
     assert search.configs == [
         SearchConfig(
@@ -307,7 +366,6 @@ def test_every_option_of_the_search_arrives_there(photo, search) -> None:
             time_s=3.5,
             top=2,
             seed=7,
-            device="cpu",
             threads=2,
         )
     ]
@@ -393,8 +451,8 @@ def test_an_empty_folder_and_an_empty_glob_are_3(photo, capsys) -> None:
 
 
 def test_a_photo_comes_through_standard_input(photo, monkeypatch, capsys) -> None:
-    with open(photo("a.png"), "rb") as stream:
-        monkeypatch.setattr(sys, "stdin", types.SimpleNamespace(buffer=stream))
+    with open(photo("a.png"), encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stdin", stream)
         assert run(["synth", "-"]) == 0
     printed = capsys.readouterr().out
     assert "SetCameraPose" in printed and "image" not in printed

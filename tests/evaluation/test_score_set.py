@@ -206,7 +206,7 @@ def test_what_is_no_set_is_refused_with_its_place(text: str, says: str, tmp_path
     (tmp_path / "annotations.json").write_text(text)
     with pytest.raises(FileError, match=says.replace("(", r"\(").replace(")", r"\)")):
         read_truth(tmp_path)
-    with pytest.raises(FileError, match="cannot read"):
+    with pytest.raises(FileError, match="there is no file"):
         read_truth(tmp_path / "none")
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import p3i
 from p3i.grammar import limits
-from p3i.grammar.diagnostics import CODES, has_errors
+from p3i.grammar.diagnostics import CODES, Diagnostic
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 LANGUAGE = (DOCS / "language.md").read_text(encoding="utf-8")
@@ -15,6 +15,12 @@ ERRORS = (DOCS / "errors.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```p3p\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SECTIONS = dict(re.findall(r"^### (P\d{3}): (.*?)(?=^##|\Z)", ERRORS, re.MULTILINE | re.DOTALL))
 EXAMPLES = [(code, example) for code, text in SECTIONS.items() for example in BLOCK.findall(text)]
+# Bytes that are no text, a sketch (of which `check` does not complain), and texts beyond a limit.
+WITHOUT_EXAMPLE = ["P100", "P116", "P120", "P121"]
+
+
+def has_errors(found: tuple[Diagnostic, ...]) -> bool:
+    return "error" in {one.severity for one in found}
 
 
 @pytest.mark.parametrize("example", BLOCK.findall(LANGUAGE))
@@ -23,8 +29,11 @@ def test_an_example_of_the_language_is_canonical_and_without_findings(example: s
     assert p3i.format(example) == example
 
 
-def test_every_code_has_its_section_in_order() -> None:
+def test_every_code_has_its_section_in_order_and_an_example() -> None:
     assert list(SECTIONS) == list(CODES)
+    without = [code for code in CODES if code not in dict(EXAMPLES)]
+    assert without == WITHOUT_EXAMPLE
+    assert len(BLOCK.findall(LANGUAGE)) >= 5
 
 
 @pytest.mark.parametrize(("code", "example"), EXAMPLES, ids=[code for code, _ in EXAMPLES])

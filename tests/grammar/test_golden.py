@@ -14,13 +14,17 @@ import pytest
 
 import p3i
 from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import CODES, has_errors
+from p3i.grammar.diagnostics import CODES, Diagnostic
 from p3i.grammar.layout import source_text
 from p3i.grammar.parser import parse
 from p3i.grammar.report import report_human
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 Golden = Callable[[Path, str], None]
+
+
+def has_errors(found: tuple[Diagnostic, ...]) -> bool:
+    return "error" in {one.severity for one in found}
 
 
 def cases(folder: str) -> list[Path]:

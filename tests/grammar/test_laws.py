@@ -10,14 +10,25 @@ from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 from lark import Lark
 
+from p3i import language
 from p3i.grammar import reader
 from p3i.grammar.ast import Program
-from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.departures import departures
+from p3i.grammar.diagnostics import CODES
 from p3i.grammar.leaves import comments, leaves, with_leaves
+from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch, format_sketch, parse_sketch
-from p3i.grammar.strict import departures, read_strictly
+from p3i.grammar.strict import read_strictly
+
+
+def parsed(draw: str, *, loops: int) -> Program:
+    """The program that draws `draw` for so many i and j."""
+    program = parse(f"for i in range(0, {loops}):\n  for j in range(0, {loops}):\n    {draw}")
+    assert isinstance(program, Program)
+    return program
+
 
 lenient = settings(
     deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
@@ -132,7 +143,7 @@ def test_strict_and_superset_agree_on_every_string_of_table_1(text: str) -> None
 LAYOUT = {"_NL": st.just("\n"), "_INDENT": st.just("    "), "_DEDENT": st.just("")}
 
 
-@given(from_lark(reader.build_superset(reader.grammar_text("p3p.lark")), start="program", explicit=LAYOUT))
+@given(from_lark(reader.build_superset(), start="program", explicit=LAYOUT))
 @settings(lenient, max_examples=25)  # such strings take long to draw
 def test_parse_is_total_on_strings_of_the_superset(text: str) -> None:
     outcome = parse(text)
@@ -160,6 +171,46 @@ def test_parse_is_total_on_anything(source: str | bytes) -> None:
 def test_parse_is_total_on_damaged_programs(seed: int, program: Program) -> None:
     outcome = parse(damaged(format_program(program), random.Random(seed)))
     assert isinstance(outcome, Program) or outcome
+
+
+@given(strategies.programs(number=strategies.reaching_numbers))
+@example(parsed("Draw(x=8*i, y=-7e301*j)", loops=5))
+@example(parsed("Draw(x=1e308*i, y=1e308*j)", loops=2))
+@example(parsed("Draw(x=1e-300*i, y=1e-320*j)", loops=5))
+@example(parsed("Draw(x=1e308*Cos(1e300*j)*i + 1e308, y=1e308*Sin(72*j)*i)", loops=3))
+@lenient
+def test_check_is_total_on_programs_that_reach_as_far_as_numbers_do(program: Program) -> None:
+    assert all(found.code in CODES for found in language.check(program))
+
+
+@given(strategies.header_texts())
+@example("# /// p3p\n# focal = 1" + "0" * 309 + "\n# ///\n")
+@example("# /// p3p\n# [fit]\n# score = -9" + "9" * 309 + "\n# ///\n")
+@lenient
+def test_check_and_format_are_total_on_headers_of_any_kind(header: str) -> None:
+    source = header + "Draw(x=1, y=2)\n"
+    found = language.check(source)
+    if all(each.severity == "warning" for each in found):
+        text = language.format(source)
+        assert language.loads(text) == language.loads(source)
+        assert language.format(text) == text
+
+
+@given(st.integers(0, 2**32), strategies.programs(number=strategies.reaching_numbers))
+@lenient
+def test_check_is_total_on_damaged_programs(seed: int, program: Program) -> None:
+    source = damaged(format_program(program), random.Random(seed))
+    assert all(found.code in CODES for found in language.check(source))
+
+
+@given(
+    strategies.sketches(), st.sampled_from(["??", "?r(1, 1e308)", "360/?n", "~1e308", "?r(-1e308, 1e308)"])
+)
+@lenient
+def test_check_is_total_on_sketches(sketch: Sketch, hole: str) -> None:
+    text = format_sketch(sketch)
+    for source in (text, text.replace("??", hole), text.replace("1", hole, 1)):
+        assert all(found.code in CODES for found in language.check(source))
 
 
 def damaged(text: str, chance: random.Random) -> str:

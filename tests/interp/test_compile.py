@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p3i.grammar.ast import Affine, CameraPose, Coordinate, Draw, For, Header, If, Polar, Program
-from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.parse_error import ParseError
 from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.size import Size

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, assume, given, settings
 
 import p3i
 from p3i.grammar.ast import Affine, Coordinate, Program
-from p3i.grammar.diagnostics import ParseError
+from p3i.grammar.parse_error import ParseError
 from p3i.interp.unroll import distinct, edges, in_front, live_indices, nest, on_one_line, points
 
 

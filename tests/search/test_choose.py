@@ -13,12 +13,12 @@ from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves
 from p3i.grammar.parser import parse
 from p3i.search import choose
+from p3i.search.answer import Answer
 from p3i.search.cells import Contrast
 from p3i.search.choose import by_explained, cost_bits, explained, explained_bits
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.result import NEEDED
-from p3i.search.session import Answer
 
 RING = DrawnRing()
 EVIDENCE = RING.evidence()

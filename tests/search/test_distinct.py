@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Polar, Program
+from p3i.search.answer import Answer
 from p3i.search.distinct import distinct_answers
 from p3i.search.focal import refocused
-from p3i.search.session import Answer
 from p3i.size import Size
 
 SIZE = Size(640, 480)

@@ -1,7 +1,7 @@
 """The sketches that the exhaustive search walks through."""
 
+from p3i.grammar.departures import departures
 from p3i.grammar.sketch import format_sketch
-from p3i.grammar.strict import departures
 from p3i.search.enumerate import sketches_by_length
 from p3i.search.sketched import structure_of
 

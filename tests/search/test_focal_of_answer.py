@@ -9,10 +9,11 @@ import pytest
 from p3i import api
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search import synthesize as synthesis
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.record import answer_record
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 from p3i.search.sketches import Family
 from p3i.search.synthesize import centers_px, focal_of
 from p3i.vision.image import Image

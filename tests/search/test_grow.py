@@ -17,8 +17,8 @@ from truth import (
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
 from p3i.search.grow import SUPPORT, grow, measure, sane, side_of_cell
+from p3i.search.guess import Proposal
 from p3i.search.lattice import Lattice
-from p3i.search.propose.lattice import Proposal
 from p3i.vision.image import Image
 
 

@@ -15,6 +15,7 @@ from p3i.grammar.ast import Affine, Polar
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.curves import CurveFit, curve_score, follow, measured
 from p3i.search.evidence import Evidence
@@ -28,7 +29,7 @@ from p3i.search.hybrids import (
 from p3i.search.propose.hybrid import HybridProposal
 from p3i.search.result import NEEDED
 from p3i.search.rings import FoundRing, numbers_of, ring_filling
-from p3i.search.session import Answer, Session
+from p3i.search.session import Session
 
 SCENES = {"concentric": 12, "fan": 9, "row": 14}
 MOVING = ("draw.x.radius.1", "draw.x.offset.1", "draw.y.offset.1")

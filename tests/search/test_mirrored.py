@@ -9,8 +9,8 @@ from p3i.grammar.ast import Program
 from p3i.grammar.parser import parse
 from p3i.interp.camera import Camera
 from p3i.search import mirrored
+from p3i.search.answer import Answer
 from p3i.search.mirrored import ambiguity_note, mirrored_camera
-from p3i.search.session import Answer
 
 # Six objects far from the camera, beside the picture's size, and a ring that fills the picture.
 FAR = DrawnRing(count=6, slots=6, center=(0, 0), radius=5, size=3, rx_deg=-30, ry_deg=0, noise=0.02)

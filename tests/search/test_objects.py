@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from truth import PATTERN, evidence_of, index_in, lattice_of, small_scene, true_theta
 
 from p3i.evaluation.lattice_scenes import lattice_scene
+from p3i.grammar.departures import departures
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
-from p3i.grammar.strict import departures
 from p3i.interp.camera import Camera, project
 from p3i.interp.unroll import points
 from p3i.search.lattice import Lattice

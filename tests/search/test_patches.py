@@ -19,7 +19,6 @@ from p3i.search.patches import (
     read,
     sample_px,
     spacing,
-    turning,
 )
 from p3i.search.rings import ring_filling
 
@@ -100,4 +99,4 @@ def test_half_steps_and_turning_follow_the_variables_that_move_the_draws() -> No
     row = compile(parse("SetCameraPose(rx=0, ry=0)\nfor i in range(0, 5):\n    Draw(x=9*i, y=1)\n"))
     assert half_steps(row).tolist() == [[0.5, 0.0]]
     assert half_steps(PATTERN).tolist() == [[0.0, 0.5]]
-    assert turning(row) is None and turning(PATTERN) == 1
+    assert row.turning is None and PATTERN.turning == 1

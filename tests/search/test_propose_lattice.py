@@ -6,13 +6,12 @@ from truth import PATTERN, evidence_of, lattice_error, lattice_of, normal, pose_
 from p3i.interp.camera import Camera
 from p3i.search.config import SearchConfig
 from p3i.search.evidence import Evidence
+from p3i.search.guess import Proposal, tilted
 from p3i.search.lattice import Lattice, map_from_index
 from p3i.search.propose.lattice import (
     MOST_TILT_DEG,
     POSE_STEP_DEG,
-    Proposal,
     straightened_proposals,
-    tilted,
     window_proposals,
 )
 from p3i.search.propose.poses import pose_grid

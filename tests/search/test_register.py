@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from truth import PATTERN, blank_level, lattice_error, pose_error_deg, turned
 
 from p3i.search.config import SearchConfig
+from p3i.search.correlate import Instances, find_instances
 from p3i.search.evidence import Evidence
 from p3i.search.lattice import PHASE, Lattice, map_from_index
-from p3i.search.register import Instances, find_instances, fit_instances, robust_fit
+from p3i.search.robust import fit_instances, robust_fit
 from p3i.vision.image import Image
 
 STEP_PX = 40.0

@@ -14,16 +14,16 @@ from truth import PATTERN, SMALL, evidence_of, lattice_error, lattice_of, pose_e
 
 from p3i.evaluation.scenes import Scene
 from p3i.grammar.ast import Program
+from p3i.grammar.departures import departures
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
-from p3i.grammar.strict import departures
 from p3i.interp.camera import Camera
 from p3i.search import lattices
 from p3i.search import synthesize as synthesize_module
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.grow import measure
 from p3i.search.result import NEEDED, StopReason, SynthesisResult
-from p3i.search.session import Answer
 from p3i.search.sketches import Family
 from p3i.search.synthesize import focal_of, synthesize
 from p3i.size import Size

@@ -184,6 +184,8 @@ def test_a_jpeg_is_read_as_its_decoder_says_with_its_profile_kept(tmp_path):
     profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     path = saved(tmp_path / "a.jpg", scene(), quality=100, icc_profile=profile)
     image = read_image(path)
+    with Pil.open(path) as picture:
+        np.testing.assert_allclose(image.pixels, np.asarray(picture) / 255, atol=1e-6)
     assert image.source.icc == profile
     assert image.source.format == "JPEG"
 
@@ -291,11 +293,11 @@ def test_a_file_without_permission_is_refused_by_the_system(tmp_path):
 
 
 def test_a_refusal_of_the_system_is_told_as_missing_permission(tmp_path, monkeypatch):
-    def refuse(self):
-        raise PermissionError(13, "Permission denied", str(self))
+    def refuse(path):
+        raise PermissionError(13, "Permission denied", str(path))
 
     path = saved(tmp_path / "a.png", scene())
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(os, "stat", refuse)
     with pytest.raises(FileError, match="no permission to read"):
         read_image(path)
 

@@ -55,9 +55,9 @@ def test_other_weights_are_refused_with_the_difference(tmp_path, content, messag
 
 
 def test_files_that_are_no_weights_are_refused(tmp_path):
-    with pytest.raises(FileError, match="no weight file"):
+    with pytest.raises(FileError, match=r"no file .*missing\.pth"):
         load_weights(tmp_path / "missing.pth", SHAPES)
-    with pytest.raises(FileError, match="cannot be read"):
+    with pytest.raises(FileError, match="is a folder"):
         load_weights(tmp_path, SHAPES)
     torch.save(good(), tmp_path / "w.pth")
     data = (tmp_path / "w.pth").read_bytes()

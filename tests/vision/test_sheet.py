@@ -85,6 +85,11 @@ def test_the_box_holds_every_cell_in_sight_of_enough_size():
     )
     assert shown.any()
     assert (inside | ~shown).all()
+    # and no row or column more than those in sight, of cells whose edges reach in
+    reaching = front & (at > -40).all(axis=1) & (at[:, 0] < 460) & (at[:, 1] < 340)
+    seen = points[reaching & (cell_sides_px(SLANTED, points)[1] >= 4)]
+    assert box.i_start >= seen[:, 0].min() - 1 and box.i_stop <= seen[:, 0].max() + 2
+    assert box.j_start >= seen[:, 1].min() - 1 and box.j_stop <= seen[:, 1].max() + 2
 
 
 def test_the_box_stops_short_of_a_horizon():

@@ -1,7 +1,7 @@
 """The file that keeps a training, and what ties it to its photo, program, hole and options."""
 
 import hashlib
-import os
+import io
 import pickle
 import zipfile
 from dataclasses import asdict
@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from p3i.errors import FileError
+from p3i.files import check_writable, read_bytes, write_bytes
 from p3i.paint.npn.options import NetworkOptions
 from p3i.paint.npn.training import Training
 from p3i.paint.placed import Placed
@@ -35,8 +36,10 @@ def fingerprint(photo: Image, placed: Placed, hole: np.ndarray, options: Network
 def load(path: Path, key: str, place: int, training: Training) -> bool:
     """Go on from a checkpoint, if there is one for hole number `place`; whether there was.
 
-    Raises FileError for a file that is no checkpoint, or one of another photo, hole or options.
+    Raises FileError for a file that is no checkpoint, or one of another photo, hole or options, and
+    for a place that cannot be written to.
     """
+    check_writable(path, force=True)  # now, not after the first minutes
     if not path.exists():
         return False
     saved = _read(path)
@@ -57,19 +60,16 @@ def save(path: Path, key: str, place: int, training: Training) -> None:
     Raises FileError where the file cannot be written.
     """
     holes = _read(path)["holes"] if path.exists() else {}
-    beside = path.with_name(path.name + ".part")
-    try:
-        torch.save({"key": key, "holes": {**holes, place: training.state()}}, beside)
-        os.replace(beside, path)
-    except (OSError, RuntimeError) as error:
-        raise FileError(f"the checkpoint {path} cannot be written: {error}") from None
+    packed = io.BytesIO()
+    torch.save({"key": key, "holes": {**holes, place: training.state()}}, packed)
+    write_bytes(path, packed.getvalue(), force=True)
 
 
 def _read(path: Path) -> dict:
     try:
         # weights_only: a checkpoint from elsewhere must not run code.
-        found = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, ValueError, EOFError, pickle.UnpicklingError, zipfile.BadZipFile):
+        found = torch.load(io.BytesIO(read_bytes(path)), map_location="cpu", weights_only=True)
+    except (RuntimeError, ValueError, EOFError, pickle.UnpicklingError, zipfile.BadZipFile):
         raise FileError(f"{path} is no checkpoint of a painting network, or it is cut off") from None
     if not isinstance(found, dict) or not {"key", "holes"} <= set(found):
         raise FileError(f"{path} is no checkpoint of a painting network")

@@ -13,11 +13,12 @@ from p3i.paint.npn.gather import Stack, gather
 from p3i.paint.npn.lessons import batch_of, lessons
 from p3i.paint.npn.network import Painted, painted_all_ways, plain
 from p3i.paint.npn.options import NetworkOptions
-from p3i.paint.npn.training import EVERY, Progress, begun, threads, train
+from p3i.paint.npn.training import EVERY, Progress, begun, train
 from p3i.paint.npn.window import Bank, Pyramid, Window, bank_of, project, step_px, window_of
 from p3i.paint.placed import Placed
 from p3i.paint.stack import fill_by_stack
 from p3i.vision.image import Image
+from p3i.vision.threads import limited_threads
 from p3i.vision.warp import taken
 
 # Of the change that held-out cells ask for, so much is made: they are few, and choose weights that suit them.
@@ -49,7 +50,7 @@ def paint(
     key = checkpoint.fingerprint(photo, placed, hole, options) if options.checkpoint else ""
     begin = time.monotonic()
     count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
-    with threads(options.threads):
+    with limited_threads(options.threads):
         for place in range(1, count):
             part = labels == place
             until = None if options.time_s is None else begin + options.time_s * place / (count - 1)

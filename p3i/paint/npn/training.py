@@ -6,7 +6,6 @@ that was never interrupted.
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
@@ -202,15 +201,3 @@ def _part(batch: Batch, places: Tensor) -> Batch:
         batch.known[places],
         batch.weights[places],
     )
-
-
-@contextmanager
-def threads(count: int | None) -> Iterator[None]:
-    """PyTorch on so many threads, for as long as it lasts."""
-    before = torch.get_num_threads()
-    if count is not None:
-        torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -6,18 +6,16 @@ autocorrelation in overlapping windows, where perspective is mild; right for sma
 for tilts beyond the grid. A window says nothing of the tilt, so it comes with several.
 """
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.autocorrelation import autocorrelation, best_pair
 from p3i.search.evidence import FINE, Evidence, Level
+from p3i.search.guess import Proposal
 from p3i.search.lattice import Lattice, reduce_basis
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
-from p3i.size import Size
 
 # The canvas of a straightened view, in pixels a side.
 _CANVAS = 128
@@ -31,15 +29,6 @@ _CHANNELS = 4
 # Shortest and longest shift, in pixels of the canvas.
 _SHIFTS = (4.0, 60.0)
 _WINDOW = 128
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Proposal:
-    """A lattice worth refining, and how promising it looked. `local`: it holds near its origin only."""
-
-    lattice: Lattice
-    worth: float
-    local: bool
 
 
 def straightened_proposals(evidence: Evidence) -> list[Proposal]:
@@ -137,18 +126,3 @@ class _Views:
         if features.ndim == 2:
             features = features[:, :, None]
         return features, even_weights(known, depth), canvas.unit, canvas.middle
-
-
-def tilted(proposal: Proposal, *, rx_deg: float, ry_deg: float, focal_mm: float, size: Size) -> Proposal:
-    """The same local lattice, read under another pose: same place and steps in the photo near its origin."""
-
-    def homography(rx: float, ry: float) -> np.ndarray:
-        return image_from_plane(rx, ry, size=size, focal_mm=focal_mm).numpy()
-
-    old = proposal.lattice
-    change = np.linalg.inv(homography(rx_deg, ry_deg)) @ homography(old.rx_deg, old.ry_deg)
-    moved = change @ np.array([*old.origin, 1.0])
-    origin = moved[:2] / moved[2]
-    slopes = (change[:2, :2] - np.outer(origin, change[2, :2])) / moved[2]
-    basis = old.basis @ slopes.T
-    return Proposal(Lattice(rx_deg, ry_deg, basis, origin), proposal.worth, proposal.local)
