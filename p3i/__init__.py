@@ -33,68 +33,85 @@ if TYPE_CHECKING:
     )
     from p3i.errors import FileError, NoPatternError, P3IError, ProgramError, UsageError
     from p3i.grammar.ast import Program
+    from p3i.grammar.diagnostics import Diagnostic
+    from p3i.grammar.parse_error import ParseError
+    from p3i.grammar.sketch import Sketch
     from p3i.interp.camera import Camera
-    from p3i.language import check, dump, dumps, expand, format, load, loads
+    from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
     from p3i.paint.edit_options import EditOptions
-    from p3i.paint.extend_options import ExtendOptions
+    from p3i.paint.extend_options import ExtendOptions, Margins, parse_margins
     from p3i.paint.inpaint_options import InpaintOptions
     from p3i.paint.options import RenderOptions
     from p3i.paint.points_options import PointsOptions
-    from p3i.paint.rectify_options import RectifyOptions
+    from p3i.paint.rectify_options import CellSize, RectifyOptions, parse_cell
     from p3i.paint.show_options import ShowOptions
     from p3i.paint.tile_options import TileOptions
     from p3i.search.config import SearchConfig
-    from p3i.search.result import StopReason, SynthesisResult
+    from p3i.search.result import Candidate, StopReason, SynthesisResult
+    from p3i.size import Size
+    from p3i.vision.image import Image
 
 _HOMES = {
     "Camera": "p3i.interp.camera",
-    "EditOptions": "p3i.paint.edit_options",
-    "FileError": "p3i.errors",
-    "NoPatternError": "p3i.errors",
-    "P3IError": "p3i.errors",
-    "PointsOptions": "p3i.paint.points_options",
-    "Program": "p3i.grammar.ast",
-    "ProgramError": "p3i.errors",
-    "RectifyOptions": "p3i.paint.rectify_options",
-    "RenderOptions": "p3i.paint.options",
-    "SearchConfig": "p3i.search.config",
-    "StopReason": "p3i.search.result",
-    "SynthesisResult": "p3i.search.result",
-    "TileOptions": "p3i.paint.tile_options",
-    "UsageError": "p3i.errors",
+    "Candidate": "p3i.search.result",
+    "CellSize": "p3i.paint.rectify_options",
     "check": "p3i.language",
+    "Diagnostic": "p3i.grammar.diagnostics",
     "dump": "p3i.language",
     "dumps": "p3i.language",
     "edit": "p3i.api",
-    "examples": "p3i.api",
+    "EditOptions": "p3i.paint.edit_options",
     "eval_set": "p3i.api",
+    "examples": "p3i.api",
     "expand": "p3i.language",
     "extend": "p3i.api",
     "ExtendOptions": "p3i.paint.extend_options",
+    "FileError": "p3i.errors",
     "format": "p3i.language",
+    "Image": "p3i.vision.image",
     "inpaint": "p3i.api",
     "InpaintOptions": "p3i.paint.inpaint_options",
     "load": "p3i.language",
+    "load_sketch": "p3i.language",
     "loads": "p3i.language",
+    "Margins": "p3i.paint.extend_options",
+    "NoPatternError": "p3i.errors",
+    "P3IError": "p3i.errors",
+    "parse_cell": "p3i.paint.rectify_options",
+    "parse_margins": "p3i.paint.extend_options",
+    "ParseError": "p3i.grammar.parse_error",
     "points": "p3i.api",
+    "PointsOptions": "p3i.paint.points_options",
+    "Program": "p3i.grammar.ast",
+    "ProgramError": "p3i.errors",
     "read_image": "p3i.api",
     "rectify": "p3i.api",
+    "RectifyOptions": "p3i.paint.rectify_options",
     "render": "p3i.api",
+    "RenderOptions": "p3i.paint.options",
     "score": "p3i.api",
-    "ShowOptions": "p3i.paint.show_options",
+    "SearchConfig": "p3i.search.config",
     "show": "p3i.api",
+    "ShowOptions": "p3i.paint.show_options",
+    "Size": "p3i.size",
+    "Sketch": "p3i.grammar.sketch",
+    "StopReason": "p3i.search.result",
     "synth": "p3i.api",
+    "SynthesisResult": "p3i.search.result",
     "tile": "p3i.api",
+    "TileOptions": "p3i.paint.tile_options",
     "trace": "p3i.api",
+    "UsageError": "p3i.errors",
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
     "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score", "check",
-    "format", "expand", "examples", "trace", "eval_set", "load", "loads", "dump", "dumps", "read_image",
-    "Program", "Camera", "SearchConfig", "SynthesisResult", "StopReason", "RenderOptions", "PointsOptions",
-    "ShowOptions", "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions",
-    "EditOptions",
-    "P3IError", "UsageError", "FileError", "ProgramError", "NoPatternError",
+    "format", "expand", "examples", "trace", "eval_set", "load", "load_sketch", "loads", "dump", "dumps",
+    "read_image", "Program", "Sketch", "Diagnostic", "Image", "Size", "Camera", "SearchConfig",
+    "SynthesisResult", "Candidate", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions",
+    "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions", "EditOptions", "CellSize",
+    "parse_cell", "Margins", "parse_margins", "P3IError", "UsageError", "FileError", "ProgramError",
+    "ParseError", "NoPatternError",
 ]  # fmt: skip
 
 

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from p3i.cli.main import COMMANDS
+
 HEAVY = ("torch", "numpy", "cv2", "PIL", "rich")
 
 
@@ -18,7 +20,7 @@ def loaded_after(code: str) -> set[str]:
 
 @pytest.mark.parametrize(
     "words",
-    [["--help"], ["--version"], ["synth", "--help"], ["render", "--help"], ["check", "--help"], ["nonsense"]],
+    [["--help"], ["--version"], ["nonsense"], *([name, "--help"] for name in COMMANDS)],
     ids=" ".join,
 )
 def test_help_loads_nothing_heavy(words: list[str]) -> None:

@@ -11,13 +11,14 @@ PACKAGE = Path(__file__).parent.parent / "p3i"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # The parts of p3i that each part may import besides itself; leaves may be imported by all.
-LEAVES = {"p3i.errors", "p3i.size", "p3i.files", "p3i.records"}
+LEAVES = {"p3i.errors", "p3i.size", "p3i.files", "p3i.records", "p3i.marks"}
 GRAMMAR, INTERP, VISION, SEARCH, PAINT = "p3i.grammar", "p3i.interp", "p3i.vision", "p3i.search", "p3i.paint"
 ALLOWED: dict[str, set[str]] = {
     "p3i.errors": set(),
     "p3i.size": set(),
     "p3i.files": set(),
     "p3i.records": set(),
+    "p3i.marks": set(),
     GRAMMAR: set(),
     INTERP: {GRAMMAR},
     VISION: set(),
@@ -25,9 +26,11 @@ ALLOWED: dict[str, set[str]] = {
     PAINT: {GRAMMAR, INTERP, VISION},
     # The torch-free functions of the API: what `p3i check` runs.
     "p3i.language": {GRAMMAR, INTERP},
-    "p3i.evaluation": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language"},
-    "p3i.api": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.evaluation"},
-    "p3i.cli": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
+    # The one loader of programs; what paints and searches gets them read.
+    "p3i.carried": {GRAMMAR, VISION},
+    "p3i.evaluation": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.carried"},
+    "p3i.api": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.carried", "p3i.evaluation"},
+    "p3i.cli": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.carried", "p3i.api"},
     "p3i.__main__": {"p3i.cli"},
     # The package itself re-exports lazily, and imports nothing.
     "p3i": {GRAMMAR, INTERP, VISION, SEARCH, PAINT, "p3i.language", "p3i.api"},
@@ -35,13 +38,14 @@ ALLOWED: dict[str, set[str]] = {
 HEAVY = {"torch", "torchvision", "numpy", "cv2", "PIL", "scipy", "rich"}
 GRAMMAR_MAY_IMPORT = {"lark"}
 # Files that must be importable without any heavy package: what `--help`, `check`, `fmt` and `expand` load.
-LIGHT = ["p3i", "p3i.api", "p3i.language", "p3i.cli", "p3i.grammar", *sorted(LEAVES)]
+LIGHT = ["p3i", "p3i.api", "p3i.language", "p3i.carried", "p3i.cli", "p3i.grammar", *sorted(LEAVES)]
 LIGHT += [
     "p3i.search.config",
     "p3i.search.result",
     "p3i.search.record",
     "p3i.interp.unroll",
     "p3i.paint.options",
+    "p3i.paint.picture_kinds",
     "p3i.paint.rectify_options",
     "p3i.paint.tile_options",
     "p3i.paint.points_options",

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from p3i import files
-from p3i.api.search import Progress, read_image, synth, without
-from p3i.errors import NoPatternError, UsageError
+from p3i.api.search import Progress, photo_and_program, read_image, without
+from p3i.carried import read_either, read_program
+from p3i.errors import UsageError
 from p3i.grammar.ast import Program
-from p3i.language import load
 from p3i.paint.edit_options import EditOptions
 from p3i.paint.extend_options import ExtendOptions
 from p3i.paint.inpaint_options import InpaintOptions
@@ -18,6 +18,7 @@ from p3i.paint.points_options import PointsOptions
 from p3i.paint.rectify_options import RectifyOptions
 from p3i.paint.show_options import ShowOptions
 from p3i.paint.tile_options import TileOptions
+from p3i.records import changed
 from p3i.search.config import SearchConfig
 
 if TYPE_CHECKING:
@@ -44,13 +45,17 @@ def render(
 ) -> "RenderedPicture":
     """Draw `program`, alone or over the photo `image`; `changes` are fields of RenderOptions.
 
-    `sprite` is a picture for every object; pictures named in the program are looked up beside its file, or
-    in the folder `beside`. The result has `pixels()`, `encode(kind)` and `save(path)`.
-    Raises FileError, ParseError and UsageError, as p3i.paint.draw.render, which draws.
+    `program` may be a file: its text, or a PNG or SVG that was drawn here before. `sprite` is a picture for
+    every object; pictures named in the program are looked up beside its file, or in the folder `beside`. The
+    result has `pixels()`, `encode(kind)` and `save(path)`. Raises FileError, ParseError and UsageError, as
+    p3i.paint.draw.render, which draws.
     """
+    asked = changed(options or RenderOptions(), changes, verb="render")
     from p3i.paint.draw import render as draw
 
-    return draw(program, options, image=image, sprite=sprite, beside=beside, **changes)
+    if beside is None and isinstance(program, str | os.PathLike):
+        beside = Path(program).parent
+    return draw(_in_memory(program), asked, image=image, sprite=sprite, beside=beside)
 
 
 def show(
@@ -67,12 +72,11 @@ def show(
     Without a program it is found first, by `config`. `changes` are fields of ShowOptions. The result has
     `pixels()`, `encode(kind)` and `save(path)`. Raises as `points`.
     """
+    asked = changed(options or ShowOptions(), changes, verb="show")
     from p3i.paint.show import show as draw
-    from p3i.paint.source import read_program
 
-    given = read_program(program) if isinstance(program, str | os.PathLike) else program
-    image, found = _photo_and_program(photo, given, config, progress=progress)
-    return draw(image, found, options, **changes)
+    image, found = photo_and_program(photo, program, config, progress=progress)
+    return draw(image, found, asked)
 
 
 def points(
@@ -91,26 +95,25 @@ def points(
     and `encode(format)`. Raises FileError, ParseError, UsageError, ProgramError for a program that draws
     nothing in front of its camera, and NoPatternError for a photo without a pattern.
     """
+    asked = changed(options or PointsOptions(), changes, verb="points")
     from p3i.paint.objects import objects_of
-    from p3i.paint.source import is_photo, read_program
-    from p3i.vision.image import Image
 
-    given: Program | None = program if isinstance(program, Program) else None
-    if isinstance(program, Image) or (isinstance(program, str | os.PathLike) and is_photo(program)):
-        if image is not None:
-            raise UsageError("both are photos: name a program and its photo, or the photo alone")
-        image = program
-    elif given is None:
-        assert isinstance(program, str | os.PathLike)
-        given = read_program(program)
-    name = None
-    if isinstance(image, str | os.PathLike) and os.fspath(image) != "-":
-        name = files.as_text(Path(image).name)
+    name = _file_name(image)
+    given = program if isinstance(program, Program) else None
+    if given is None:
+        named = _file_name(program)
+        either = read_either(program) if isinstance(program, str | os.PathLike) else program
+        if isinstance(either, Program):
+            given = either
+        elif image is not None:
+            raise UsageError("both are photos: name a photo and its program, or the photo alone")
+        else:
+            image, name = either, named
     if image is None:
         assert given is not None
-        return objects_of(given, None, options, **changes)
-    photo, found = _photo_and_program(image, given, config, progress=progress)
-    return objects_of(found, photo, options, image=name, **changes)
+        return objects_of(given, None, asked)
+    photo, found = photo_and_program(image, given, config, progress=progress)
+    return objects_of(found, photo, asked, image=name)
 
 
 def rectify(
@@ -128,10 +131,11 @@ def rectify(
     and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program without objects on the
     photo, and NoPatternError for a photo without a pattern.
     """
+    asked = changed(options or RectifyOptions(), changes, verb="rectify")
     from p3i.paint.rectify import rectify as straighten
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
-    return straighten(image, found, options, **changes)
+    image, found = photo_and_program(photo, program, config, progress=progress)
+    return straighten(image, found, asked)
 
 
 def tile(
@@ -149,10 +153,11 @@ def tile(
     and `notes`. Raises FileError, ParseError, UsageError, ProgramError for what is neither a lattice
     nor rings or has no object on the photo, and NoPatternError for a photo without a pattern.
     """
+    asked = changed(options or TileOptions(), changes, verb="tile")
     from p3i.paint.tile import tile as make
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
-    return make(image, found, options, **changes)
+    image, found = photo_and_program(photo, program, config, progress=progress)
+    return make(image, found, asked)
 
 
 def inpaint(
@@ -173,12 +178,17 @@ def inpaint(
     InpaintOptions. The result has `pixels`, `paint()`, `save(path)`, `unlike` and `notes`. Raises FileError,
     ParseError, UsageError, ProgramError for a program without objects on the photo, and NoPatternError.
     """
+    asked = changed(options or InpaintOptions(), changes, verb="inpaint")
     from p3i.paint.inpaint import inpaint as fill
 
     image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    if isinstance(mask, str | os.PathLike):
+        from p3i.vision.image import read_mask
+
+        mask = read_mask(mask, image.size)  # once: it may come from standard input, and is needed twice
     seen = without(image, mask=mask, roi=None) if program is None else image
-    _, found = _photo_and_program(seen, program, config, progress=progress)
-    return fill(image, found, options, mask=mask, remove=remove, progress=progress, **changes)
+    _, found = photo_and_program(seen, program, config, progress=progress)
+    return fill(image, found, asked, mask=mask, remove=remove, progress=progress)
 
 
 def extend(
@@ -196,10 +206,11 @@ def extend(
     `margins`, `paint()`, `save(path)`, `program`, `record()` and `notes`. Raises FileError, ParseError,
     UsageError where the picture would reach the horizon, ProgramError and NoPatternError.
     """
+    asked = changed(options or ExtendOptions(), changes, verb="extend")
     from p3i.paint.extend import extend as continue_photo
 
-    image, found = _photo_and_program(photo, program, config, progress=progress)
-    return continue_photo(image, found, options, progress=progress, **changes)
+    image, found = photo_and_program(photo, program, config, progress=progress)
+    return continue_photo(image, found, asked, progress=progress)
 
 
 def edit(
@@ -218,28 +229,20 @@ def edit(
     has `pixels`, `touched`, `kept`, `removed`, `added`, `paint()`, `save(path)` and `notes`. Raises
     FileError, ParseError, UsageError, ProgramError for a program without objects, and NoPatternError.
     """
+    asked = changed(options or EditOptions(), changes, verb="edit")
     from p3i.paint.edit import edit as lay_anew
 
-    wanted = new if isinstance(new, Program) else load(Path(new))
-    image, found = _photo_and_program(photo, old, config, progress=progress)
-    return lay_anew(image, found, wanted, options, **changes)
+    wanted = _in_memory(new)
+    image, found = photo_and_program(photo, old, config, progress=progress)
+    return lay_anew(image, found, wanted, asked)
 
 
-def _photo_and_program(
-    photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str] | None,
-    config: SearchConfig | None = None,
-    *,
-    progress: Progress | None = None,
-) -> "tuple[Image, Program]":
-    """Both in memory: read where they are files, the program found by `synth` where there is none.
+def _in_memory(program: Program | str | os.PathLike[str]) -> Program:
+    return program if isinstance(program, Program) else read_program(program)
 
-    Raises NoPatternError where none is found, FileError and ParseError for files that cannot be read.
-    """
-    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    if program is None:
-        result = synth(image, config, progress=progress)
-        if result.program is None:
-            raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
-        return image, result.program
-    return image, program if isinstance(program, Program) else load(Path(program))
+
+def _file_name(photo: object) -> str | None:
+    """The last part of a photo's path; None where it has none."""
+    if not isinstance(photo, str | os.PathLike) or os.fspath(photo) == "-":
+        return None
+    return files.as_text(Path(photo).name)

@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from p3i import files
-from p3i.errors import UsageError
+from p3i.api.refusal import refuses_unknown
+from p3i.carried import read_program
+from p3i.errors import NoPatternError, UsageError
 from p3i.grammar.ast import Header, Program
-from p3i.language import load, load_sketch
+from p3i.language import load_sketch
+from p3i.records import changed
 from p3i.search.config import SearchConfig
 from p3i.search.result import Candidate, SynthesisResult
 
@@ -28,6 +31,7 @@ Progress = Callable[[str, float], None]
 Trace = Callable[[Mapping[str, Any]], None]
 
 
+@refuses_unknown
 def read_image(path: str | os.PathLike[str], *, max_px: int | None = None) -> "Image":
     """The photo at `path`, upright, RGB in 0..1, with its mask of known pixels and its focal.
 
@@ -62,15 +66,12 @@ def synth(
     Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
     UsageError for options that cannot be, FileError for a photo or mask that cannot be read.
     """
-    from p3i.search.synthesize import synthesize
-
-    known = {field.name for field in dataclasses.fields(SearchConfig)}
-    if unknown := sorted(options.keys() - known):
-        raise UsageError(f"synth has no option {unknown[0]!r}; it has {', '.join(sorted(known))}")
-    for name, reader in (("sketch", load_sketch), ("start", load)):
+    for name, reader in (("sketch", load_sketch), ("start", read_program)):
         if isinstance(options.get(name), str | os.PathLike):
             options[name] = reader(options[name])
-    config = dataclasses.replace(config or SearchConfig(), **options)
+    config = changed(config or SearchConfig(), options, verb="synth")
+    from p3i.search.synthesize import synthesize
+
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
     result = synthesize(without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
     name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
@@ -81,20 +82,48 @@ def synth(
 
 def score(
     photo: "str | os.PathLike[str] | Image",
-    program: Program | str | os.PathLike[str],
+    program: Program | str | os.PathLike[str] | None = None,
     config: SearchConfig | None = None,
+    *,
+    progress: Progress | None = None,
+    **options: Any,
 ) -> "Evaluation":
     """How well `program` explains `photo`: equation 2 as printed in the paper, and the normalised score.
 
-    Raises FileError or ParseError where photo or program cannot be read.
+    Without a program it is the one that `synth` finds. `options` change `config` as in `synth`. Raises
+    UsageError for options that cannot be, FileError or ParseError where photo or program cannot be read,
+    NoPatternError for a photo without a pattern.
     """
+    asked = changed(config or SearchConfig(), options, verb="score")
     from p3i.search.score import evaluate
 
+    image, given = photo_and_program(photo, program, asked, progress=progress)
+    return evaluate(image, given, asked)
+
+
+def photo_and_program(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None,
+    config: SearchConfig | None = None,
+    *,
+    progress: Progress | None = None,
+) -> "tuple[Image, Program]":
+    """Both in memory: read where they are files, the program found by `synth` where there is none.
+
+    Raises NoPatternError where none is found, FileError and ParseError for files that cannot be read.
+    """
+    # The program first: it is soon known to be wrong.
+    given = program if isinstance(program, Program | None) else read_program(program)
     image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    tree = program if isinstance(program, Program) else load(program)
-    return evaluate(image, tree, config or SearchConfig())
+    if given is not None:
+        return image, given
+    result = synth(image, config, progress=progress)
+    if result.program is None:
+        raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
+    return image, result.program
 
 
+@refuses_unknown
 def trace(trace: str | os.PathLike[str], *, image: str | os.PathLike[str] | None = None) -> "Film":
     """The search that `p3i synth --trace` wrote down, as pictures over its photo.
 
@@ -122,11 +151,12 @@ def eval_set(
     `options` change `config` as in `synth`. With `results`, a file of the JSON lines that `synth` printed,
     nothing is searched. `jobs` is the number of processes. Raises FileError and UsageError.
     """
+    asked = changed(config or SearchConfig(), options, verb="eval_set")
     from p3i.evaluation.score_set import score_set
 
     return score_set(
         files.named(folder),
-        dataclasses.replace(config or SearchConfig(), **options),
+        asked,
         results=None if results is None else files.named(results),
         jobs=jobs,
         only=only,
@@ -135,6 +165,7 @@ def eval_set(
     )
 
 
+@refuses_unknown
 def examples(
     folder: str | os.PathLike[str],
     *,

@@ -6,21 +6,23 @@ import click
 
 from p3i import language
 from p3i.cli import grouped, options, programs
+from p3i.cli.inputs import INPUT
 from p3i.errors import P3IError
 from p3i.grammar.layout import source_text
 from p3i.grammar.report import report_human, report_json, summary
 
 
 @grouped.command("check")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.argument("files", metavar="FILE...", type=INPUT, nargs=-1, required=True)
 @click.option("--strict", is_flag=True, help="Hold the programs to Table 1 of the paper, to the letter.")
 @options.quiet
 @options.error_format
 def command(files: tuple[str, ...], strict: bool, quiet: bool, error_format: str) -> int:
     """Report every error and warning in programs and sketches, each with its place and what to write instead.
 
-    FILE is a program, a glob, a folder (its *.p3p files), or - for standard input. Findings go to stdout;
-    with --error-format json as one object a line. Warnings exit 0, errors 4.
+    FILE is a program, a glob, a folder (its *.p3p files), @LIST (a text file of such names), or - for
+    standard input. Findings go to stdout; with --error-format json as one object a line. Warnings exit 0,
+    errors 4.
     """
     as_json = error_format == "json"
     color = programs.coloured(sys.stdout)

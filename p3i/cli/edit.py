@@ -1,47 +1,45 @@
-"""`p3i edit`: a photo and two programs in, the photo with its objects laid anew out."""
+"""`p3i edit`: photos and two programs in, the photos with their objects laid anew out."""
 
 from typing import Any
 
-import click
-
 from p3i import api
-from p3i.cli import grouped, options, progress
-from p3i.cli.pictures import Outputs, json_option, kind_option
+from p3i.carried import read_program
+from p3i.cli import batch, grouped, inputs, options, targets
+from p3i.cli.inputs import photos_and_programs
+from p3i.cli.pictures import PICTURES, made, prepared
 from p3i.errors import UsageError
-from p3i.paint.edit_options import EditOptions, parse_scale
-from p3i.records import told
-
-sentence, _ = told(EditOptions)
+from p3i.paint.edit_options import EditOptions
 
 
 @grouped.command("edit")
-@click.argument("photo", metavar="PHOTO", type=click.Path())
-@click.argument("old", metavar="OLD", type=click.Path())
-@click.argument("new", metavar="NEW", type=click.Path())
-@options.output("Where to write the picture, the kind by the suffix; - is stdout.")
-@kind_option
-@json_option
-@options.force
-@click.option("--scale", metavar="auto|S", default="auto", help=sentence("scale"))
-@options.focal(EditOptions)
+@inputs.words("PHOTO... [OLD] NEW")
+@grouped.group("The objects", options.of(EditOptions))
+@targets.written(PICTURES, "Where to write the picture.")
 @options.quiet
 @options.verbose
 @options.error_format
-def command(**given: Any) -> None:
-    """Lay the objects that the program OLD finds on PHOTO anew, as the program NEW says.
+def command(**given: Any) -> int:
+    """Lay the objects that the program OLD finds on each PHOTO anew, as the program NEW says.
 
     What stands where it stood keeps its pixels; the rest of OLD's objects give way to the ground, and copies
-    are put where NEW draws. NEW is seen by OLD's camera unless it names its own.
+    are put where NEW draws. NEW is seen by OLD's camera unless it names its own. Without OLD it is searched
+    for.
     """
-    photo, old, new = given["photo"], given["old"], given["new"]
-    if [photo, old, new].count("-") > 1:
-        raise UsageError("only one input can be standard input")
-    asked = EditOptions(scale=parse_scale(given["scale"]), focal_mm=given["focal_mm"])
-    outputs = Outputs.of(given, inputs=(photo, old, new))
-    with progress.bar(photo, wanted=not given["quiet"]) as update:
-        found = api.edit(photo, old, new, asked, progress=update)
-    outputs.say((*found.photo.notes, *found.notes), name=photo)
-    if outputs.kind in ("jpg", "webp"):
-        kind = outputs.kind.upper()
-        outputs.say([f"{kind} stores every pixel anew: write PNG or TIFF to keep the others"], name=photo)
-    outputs.write(found.paint(), found.record(), name=photo)
+    asked = options.chosen(EditOptions, given)
+    found = photos_and_programs(given["words"], most=2)
+    if not found.programs:
+        raise UsageError("the last word is no program: name the photo, its program, and the new one")
+    to = prepared(given, found)
+    *olds, new = map(read_program, found.programs)
+
+    def lay_anew(photo: str, update: batch.Update) -> batch.Answer:
+        edited = api.edit(photo, olds[0] if olds else None, new, asked, progress=update)
+        size, facts = edited.photo.size, f"{int(edited.touched.sum()):,} pixels changed"
+        return batch.Answer(
+            make=lambda: made(edited.paint(), to.kind, keeps="the others"),
+            facts=edited.record,
+            notes=(*edited.photo.notes, *edited.notes),
+            more=[f"{size.width} x {size.height} px, {facts}"],
+        )
+
+    return batch.run(found.photos, lay_anew, to=to, talk=batch.Talk.of(given))

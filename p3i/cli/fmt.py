@@ -6,6 +6,7 @@ import click
 
 from p3i import language
 from p3i.cli import grouped, options, programs, report
+from p3i.cli.inputs import INPUT
 from p3i.errors import P3IError, UsageError
 from p3i.grammar.layout import source_text
 from p3i.grammar.parse_error import ParseError
@@ -13,7 +14,7 @@ from p3i.grammar.printer import Layout
 
 
 @grouped.command("fmt")
-@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.argument("files", metavar="FILE...", type=INPUT, nargs=-1, required=True)
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; exit 1 if a file would change.")
 @click.option("--diff", "only_diff", is_flag=True, help="Write nothing; print what would change.")
 @click.option(
@@ -36,9 +37,9 @@ def command(
 ) -> int:
     """Rewrite programs and sketches in place, in the one spelling that p3i prints.
 
-    FILE is a program, a glob, a folder (its *.p3p files), or - to read standard input and write standard
-    output. Comments and the header block stay. A file with errors stays as it is, and so does every file
-    whose new text would not mean the same.
+    FILE is a program, a glob, a folder (its *.p3p files), @LIST (a text file of such names), or - to read
+    standard input and write standard output. Comments and the header block stay. A file with errors stays as
+    it is, and so does every file whose new text would not mean the same.
     """
     if strict and layout == "python":
         raise UsageError("strict text exists in layout table1 only: leave out --layout python or --strict")

@@ -190,9 +190,3 @@ def _type(kind: Any, found: Field) -> Any:
 def _shown(default: Any) -> bool:
     """Whether `--help` can show a default as it is: a word or a number."""
     return isinstance(default, str | int | float)
-
-
-def photo_and_program(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The arguments `PHOTO [PROG]`; both arrive as text, `program` as None where there is none."""
-    program = click.argument("program", metavar="[PROG]", type=click.Path(), required=False)
-    return click.argument("photo", metavar="PHOTO", type=click.Path())(program(command))

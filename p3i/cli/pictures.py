@@ -1,112 +1,102 @@
-"""What the commands share that take a photo with its program and write a picture: options, talk, output."""
+"""What the commands share that take photos with a program and write a picture of each."""
 
-import dataclasses
-import json
-import re
-import sys
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from p3i import files
-from p3i.cli import report
-from p3i.cli.options import Decorator
+from p3i.carried import read_program
+from p3i.cli import batch
+from p3i.cli.inputs import Inputs, photos_and_programs
+from p3i.cli.targets import Kinds, Targets, targets
 from p3i.errors import UsageError
-from p3i.paint.rectify_options import PICTURE_KINDS
+from p3i.grammar.ast import Program
+from p3i.paint.options import KINDS
+from p3i.paint.picture_kinds import BY_SUFFIX, LOSSY
 
 if TYPE_CHECKING:
+    from p3i.paint.draw import RenderedPicture
     from p3i.paint.picture import Picture
 
-_SUFFIXES = {f".{kind}": kind for kind in PICTURE_KINDS} | {".jpeg": "jpg", ".tif": "tiff"}
+PICTURES = Kinds(by_suffix=BY_SUFFIX)
+"""Photos that were changed."""
 
-kind_option: Decorator = click.option(
-    "--format",
-    "kind",
-    type=click.Choice(PICTURE_KINDS),
-    default=None,
-    help="The kind of picture. [default: by the name of -o, else png]",
-)
-"""`--format png|jpg|tiff|webp`."""
-
-json_option: Decorator = click.option(
-    "--json", "json_to", metavar="FILE|-", default=None, help="Write the facts as JSON; - is stdout."
-)
-"""`--json FILE|-`; to stdout no picture is made, unless -o names a file for it."""
+DRAWINGS = Kinds(by_suffix={f".{kind}": kind for kind in KINDS}, text=frozenset({"svg"}))
+"""Programs that were drawn."""
 
 
-@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
-class Outputs:
-    """Where a picture and its facts go, known before any work: `picture`, `facts` are files, - or None."""
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One photo with the program that serves all, or none; the kind of its file; where to report progress."""
 
-    picture: str | None
+    photo: str
+    program: Program | None
     kind: str
-    facts: str | None
-    force: bool
-    quiet: bool
-    as_json: bool
-
-    @classmethod
-    def of(cls, given: dict[str, Any], *, inputs: Iterable[str | None] = ()) -> "Outputs":
-        """What the shared options mean; raises UsageError or FileError for what cannot be written."""
-        output: str | None = given["output"]
-        facts: str | None = given["json_to"]
-        kind: str | None = given["kind"]
-        if output is not None and files.names_folder(output):
-            raise UsageError(f"{output} is a folder: name a file in it")
-        if kind is None:
-            suffix = ".png" if output is None else Path(output).suffix.lower()
-            if suffix not in _SUFFIXES:
-                known = ", ".join(_SUFFIXES)
-                raise UsageError(f"cannot tell the kind of picture from {output!r}: end the name in {known}")
-            kind = _SUFFIXES[suffix]
-        picture = output or (None if facts == "-" else "-")
-        if picture == "-" and sys.stdout.isatty():
-            raise UsageError(f"a {kind.upper()} picture does not belong on a terminal: name a file with -o")
-        for path in (picture, facts):
-            if path not in (None, "-"):
-                files.check_writable(Path(str(path)), force=given["force"])
-        named = [path for path in (picture, facts) if path is not None and path != "-"]
-        written = {files.place_of(path): path for path in named}
-        if len(written) < len(named):
-            raise UsageError(f"picture and facts would both be written to {named[0]}")
-        taken = {files.place_of(word) for word in inputs if word is not None and word != "-"}
-        if clash := [path for place, path in written.items() if place in taken]:
-            raise UsageError(f"{clash[0]} is read here: write to another file")
-        return cls(
-            picture=picture,
-            kind=kind,
-            facts=facts,
-            force=given["force"],
-            quiet=given["quiet"],
-            as_json=given["error_format"] == "json",
-        )
-
-    def write(self, picture: "Picture | None", facts: dict[str, Any], *, name: str) -> None:
-        """Write both, the picture first; say what the kind of file loses."""
-        if picture is not None and self.picture is not None:
-            self.say(picture.notes(self.kind), name=name)
-            picture.save(self.picture, kind=self.kind, force=self.force)
-        if self.facts is None:
-            return
-        text = facts_text(facts)
-        if self.facts == "-":
-            click.echo(text.encode("utf-8"), nl=False)
-            return
-        with files.replacing(Path(self.facts), force=self.force) as stream:
-            stream.write(text)
-
-    def say(self, sentences: Iterable[str], *, name: str, kind: str = "note") -> None:
-        """Say sentences on stderr, unless asked to be quiet."""
-        if not self.quiet:
-            for sentence in sentences:
-                message = sentence if self.as_json else f"{name}: {sentence}"
-                report.line(message, as_json=self.as_json, kind=kind, image=name)
+    update: batch.Update
+    program_name: str | None
+    one_of_many: bool
+    """Whether its answer follows others in one stream."""
 
 
-def facts_text(facts: dict[str, Any]) -> str:
-    """JSON with one key a line; rows of numbers stay on theirs."""
-    text = json.dumps(facts, indent=2)
-    rows = re.compile(r"\[[^\[\]{}]*\]")
-    return rows.sub(lambda row: "[" + ", ".join(re.split(r",\s+", row[0][1:-1].strip())) + "]", text) + "\n"
+def each_photo(
+    given: Mapping[str, Any],
+    work: Callable[[Job], batch.Answer],
+    *,
+    kinds: Kinds = PICTURES,
+    alone: Mapping[str, object] | None = None,
+    read: Iterable[str | None] = (),
+) -> int:
+    """Do `work` on each photo of the call with its one program, or with none; returns the exit code.
+
+    `alone` are the options that serve one photo only, with what was given for them; `read` other files that
+    the call reads. The program is read once, before any photo. Raises as `targets` and `read_program`.
+    """
+    found = photos_and_programs(given["words"])
+    to = prepared(given, found, kinds=kinds, alone=alone, read=read)
+    program = None if found.program is None else read_program(found.program)
+    talk = batch.Talk.of(given)
+
+    def on_one(photo: str, update: batch.Update) -> batch.Answer:
+        return work(Job(photo, program, to.kind, update, found.program, to.answers_in_one))
+
+    return batch.run(found.photos, on_one, to=to, talk=talk)
+
+
+def prepared(
+    given: Mapping[str, Any],
+    found: Inputs,
+    *,
+    kinds: Kinds = PICTURES,
+    alone: Mapping[str, object] | None = None,
+    read: Iterable[str | None] = (),
+) -> Targets:
+    """Where the answers go; raises UsageError for options of `alone` where there are several photos."""
+    if len(found.photos) > 1:
+        for option, value in (alone or {}).items():
+            if value not in (None, (), False):
+                raise UsageError(f"{option} takes one photo, not {len(found.photos)}")
+    return targets(given, inputs=found.photos, kinds=kinds, read=(*found.programs, *read))
+
+
+def drawn(picture: "RenderedPicture", kind: str) -> batch.Answer:
+    """A drawn program as an answer in a file of `kind`."""
+    size, camera = picture.size, picture.camera
+    facts = f"{size.width} x {size.height} px, focal {camera.focal_mm:g} mm ({picture.focal_source})"
+    return batch.Answer(
+        make=lambda: batch.Made(picture.encode(kind)),
+        facts=picture.record,
+        notes=picture.notes,
+        more=[facts],
+    )
+
+
+def made(picture: "Picture", kind: str, *, keeps: str = "") -> batch.Made:
+    """A picture as a file of `kind`, with what such a file loses; `keeps` names pixels that should stay."""
+    anew = stored_anew(kind, keeps) if keeps else ()
+    return batch.Made(picture.encode(kind), (*anew, *picture.notes(kind)))
+
+
+def stored_anew(kind: str, whose: str) -> Sequence[str]:
+    """The note on a kind of file that keeps no pixel to the bit."""
+    if kind not in LOSSY:
+        return ()
+    return (f"{kind.upper()} stores every pixel anew: write PNG or TIFF to keep {whose}",)

@@ -9,6 +9,7 @@ import click
 
 from p3i import language
 from p3i.cli import report
+from p3i.cli.inputs import listed
 from p3i.errors import P3IError
 from p3i.files import gather
 from p3i.grammar.parse_error import ParseError
@@ -21,7 +22,11 @@ def sources(words: Iterable[str], *, as_json: bool) -> Iterator[tuple[str, bytes
     """Each input as (name, bytes), `-` is stdin. What cannot be read is reported, and given as its error."""
     for word in words:
         try:
-            paths = [STDIN] if word == STDIN else [str(path) for path in gather([word], suffixes=SUFFIXES)]
+            paths = (
+                [STDIN]
+                if word == STDIN
+                else [str(path) for path in gather(listed([word]), suffixes=SUFFIXES)]
+            )
         except P3IError as error:
             report.p3i_error(error, as_json=as_json)
             yield error

@@ -1,4 +1,4 @@
-"""`p3i score`: how well a program explains a photo."""
+"""`p3i score`: how well programs explain photos."""
 
 import json
 from typing import Any
@@ -6,49 +6,67 @@ from typing import Any
 import click
 
 from p3i import api
-from p3i.cli import grouped, options
+from p3i.cli import batch, grouped, inputs, options, targets
+from p3i.cli.pictures import Job, each_photo
+from p3i.cli.targets import Kinds
 from p3i.search.config import SearchConfig
+
+SCORES = Kinds(
+    by_suffix={".txt": "text", ".json": "json"},
+    endings={"text": ".txt"},
+    text=frozenset({"text", "json"}),
+    lines=frozenset({"text", "json"}),
+    what="form of the numbers",
+)
 
 
 @grouped.command("score")
-@click.argument("image", metavar="IMAGE", type=click.Path())
-@click.argument("program", metavar="PROG", type=click.Path())
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="How to print the numbers.",
+@inputs.words("PHOTO... [PROG]")
+@grouped.group(
+    "The score",
+    click.option(
+        "--focal",
+        "focal_mm",
+        type=float,
+        metavar="MM",
+        help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
+    ),
+    options.of(SearchConfig, "features", "weights", "threads"),
 )
-@click.option(
-    "--focal",
-    "focal_mm",
-    type=float,
-    metavar="MM",
-    help="35 mm-equivalent focal length; by default the program's, else that of the photo, else 35.",
-)
-@options.of(SearchConfig, "features", "weights", "threads")
+@targets.written(SCORES, "Where to write the numbers.")
+@options.quiet
+@options.verbose
 @options.error_format
-def command(image: str, program: str, form: str, error_format: str, **given: Any) -> None:
-    """Compare the photo IMAGE with itself at the neighbouring draws of the program PROG.
+def command(**given: Any) -> int:
+    """Compare each PHOTO with itself at the neighbouring draws of the program PROG.
 
     Prints equation 2 of the paper as printed there (the sum of squared feature differences over the
     edges; less is better, but a smaller pattern has less too) and the normalised score (more is better),
-    by which `p3i synth` chooses.
+    by which `p3i synth` chooses. Without PROG the program is searched for.
     """
     config = options.chosen(SearchConfig, given)
-    found = api.score(image, program, config)
-    if form == "json":
-        record = {
-            "image": image,
-            "program": program,
+
+    def judge(job: Job) -> batch.Answer:
+        found = api.score(job.photo, job.program, config, progress=job.update)
+        facts = {
+            "image": job.photo,
+            "program": job.program_name,
             "equation2": found.equation2,
             "edges": found.edges,
             "score": found.normalised,
             "features": config.features_used,
         }
-        click.echo(json.dumps(record))
-        return
-    click.echo(f"score       {found.normalised:.4f}   normalised; more is better")
-    click.echo(f"equation 2  {found.equation2:.6g}   over {found.edges} edges, as printed; less is better")
+        lines = (
+            f"score       {found.normalised:.4f}   normalised; more is better",
+            f"equation 2  {found.equation2:.6g}   over {found.edges} edges, as printed; less is better",
+        )
+        if job.one_of_many:
+            lines = (f"{job.photo}:", *lines)
+        text = json.dumps(facts) if job.kind == "json" else "\n".join(lines)
+        return batch.Answer(
+            make=lambda: batch.Made(f"{text}\n".encode()),
+            facts=lambda: facts,
+            more=[f"{found.objects} objects in sight"],
+        )
+
+    return each_photo(given, judge, kinds=SCORES)

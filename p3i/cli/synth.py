@@ -12,7 +12,10 @@ from typing import IO, Any
 import click
 
 from p3i import api, files
+from p3i.carried import read_program
 from p3i.cli import grouped, options, progress, report, workers
+from p3i.cli.batch import exit_code
+from p3i.cli.inputs import INPUT, listed
 from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.cli.solving import Outcome, Task, failure, prepare, solve
 from p3i.errors import P3IError, UsageError
@@ -21,7 +24,7 @@ from p3i.search.result import Candidate, StopReason
 
 
 @grouped.command("synth")
-@click.argument("images", metavar="IMAGE...", nargs=-1, required=True)
+@click.argument("images", metavar="PHOTO...", type=INPUT, nargs=-1, required=True)
 @grouped.group(
     "Output",
     click.option(
@@ -38,10 +41,10 @@ from p3i.search.result import Candidate, StopReason
 )
 @grouped.group(
     "What to look for",
-    options.of(SearchConfig, "structure", "extent", "sketch", "start", "strict"),
-    click.option(
-        "--mask", type=click.Path(), metavar="FILE", help="A picture whose white pixels are unknown."
-    ),
+    options.of(SearchConfig, "structure", "extent"),
+    options.of(SearchConfig, "sketch", "start", sketch={"type": INPUT}, start={"type": INPUT}),
+    options.of(SearchConfig, "strict"),
+    click.option("--mask", type=INPUT, metavar="FILE", help="A picture whose white pixels are unknown."),
     click.option(
         "--roi",
         metavar="X,Y,W,H|POINTS",
@@ -63,7 +66,7 @@ from p3i.search.result import Candidate, StopReason
 @options.verbose
 @options.error_format
 def command(**given: Any) -> int:
-    """Find the camera and the program of the pattern on each IMAGE: a file, a glob or a folder.
+    """Find the camera and the program of the pattern on each PHOTO: a file, a glob, a folder, or @LIST.
 
     Prints the program of a single photo on stdout. Exits with 5 where there is no regular pattern, and
     with 6 where only some of many photos have one. Ctrl-C prints the best program so far.
@@ -96,10 +99,10 @@ class Call:
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Call":
         """The call that the options of the command line mean; raises UsageError or FileError."""
-        readers = {"sketch": api.load_sketch, "start": api.load}
+        readers = {"sketch": api.load_sketch, "start": read_program}
         read = {name: None if given[name] is None else readers[name](given[name]) for name in readers}
         config = options.chosen(SearchConfig, given, **read)
-        photos = tuple(files.gather(given["images"], suffixes=SUFFIXES))
+        photos = tuple(files.gather(listed(given["images"]), suffixes=SUFFIXES))
         output: str | None = given["output"]
         form = given["form"] or ("jsonl" if output and Path(output).suffix == ".jsonl" else "p3p")
         into_folder = output is not None and files.names_folder(output)
@@ -157,7 +160,7 @@ def run(call: Call) -> int:
             except KeyboardInterrupt:  # what was written before stays
                 codes.append(130)
                 break
-    return _exit_code(codes)
+    return exit_code(codes)
 
 
 @contextmanager
@@ -306,14 +309,6 @@ def _talk(call: Call, outcome: Outcome) -> None:
         found = f"{result.structure} of {len(result.centers)} objects{score}{margin}, {focal}"
         message = f"{name}: {found}, {outcome.seconds:.1f} s"
         report.line(message, as_json=as_json, kind="info", image=name)
-
-
-def _exit_code(codes: list[int]) -> int:
-    """0 if all went well, the common code if all failed alike, else 6; 130 once interrupted."""
-    if 130 in codes:
-        return 130
-    kinds = set(codes)
-    return kinds.pop() if len(kinds) == 1 else 6
 
 
 def _ranked(target: Path, rank: int) -> Path:

@@ -1,7 +1,7 @@
 """Programs as pictures: alone, over their photo, or straightened; with dots, cells, or pictures."""
 
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
 from p3i.interp.unroll import distinct, nest, points
+from p3i.marks import PNG_KEYWORD
 from p3i.paint import outlines, scene
 from p3i.paint.bent import bent
 from p3i.paint.lens import bent_points
@@ -21,7 +22,6 @@ from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
 from p3i.paint.placed import FAR, FocalSource, camera_of, refuse_edge_on
 from p3i.paint.raster import paint
-from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.sprite import lay, sprite_of
 from p3i.paint.svg import svg
 from p3i.paint.view import (
@@ -88,6 +88,21 @@ class RenderedPicture:
         colours = np.ascontiguousarray(values[:, :, :3])
         return encode(colours, kind=".png", alpha=alpha, text={PNG_KEYWORD: text})
 
+    def record(self) -> dict[str, Any]:
+        """The facts as plain JSON values: the canvas, the camera (degrees, mm), the objects, the program."""
+        seen = np.isfinite(self.centers_px).all(axis=1)
+        return {
+            "size": [self.size.width, self.size.height],
+            "camera": {
+                "rx": self.camera.rx_deg,
+                "ry": self.camera.ry_deg,
+                "focal": self.camera.focal_mm,
+                "focal_from": self.focal_source,
+            },
+            "objects": int(seen.sum()),
+            "program": format_program(self.program),
+        }
+
     def save(self, path: Path_, *, kind: str | None = None, force: bool = False) -> None:
         """Write a file, whole or not at all, its kind by the suffix unless `kind` says; `-` is stdout.
 
@@ -98,7 +113,7 @@ class RenderedPicture:
 
 
 def render(
-    program: Program | Path_,
+    program: Program,
     options: RenderOptions | None = None,
     *,
     image: Path_ | Image | None = None,
@@ -109,19 +124,13 @@ def render(
 ) -> RenderedPicture:
     """Draw a program: dots coloured by loop index, cells, horizon, or a picture at each object.
 
-    `program` may be a file, also a PNG or SVG that was drawn here before. With `image` the drawing goes over
-    that photo; with `plane` the plane is seen straight on (and the photo straightened). `sprite` stands at
-    every object, flat on the plane, and wins over the picture named in `Draw`, which is looked up beside the
-    program's file, or in the folder `beside`, unless `named_pictures` is False. `changes` are fields of
-    RenderOptions.
-
-    Raises FileError for files that cannot be read, ParseError (a ProgramError) for texts that are no program,
-    sketches among them, ProgramError where the plane is seen edge-on, UsageError for options that cannot be.
+    With `image` the drawing goes over that photo; with `plane` the plane is seen straight on (and the photo
+    straightened). `sprite` stands at every object, flat on the plane, and wins over the picture named in
+    `Draw`, which is looked up in the folder `beside` (the working folder), unless `named_pictures` is False.
+    `changes` are fields of RenderOptions. Raises FileError for pictures that cannot be read, ProgramError
+    where the plane is seen edge-on, UsageError for options that cannot be.
     """
     options = changed(options or RenderOptions(), changes, verb="render")
-    if not isinstance(program, Program):
-        beside = Path(fspath(program)).parent if beside is None else beside
-        program = read_program(program)
     folder = Path(beside or ".")
     photo = read_image(image) if isinstance(image, str | PathLike) else image
     camera, focal_source = camera_of(program, photo, focal_mm=options.focal_mm)
@@ -160,7 +169,7 @@ def render(
 
 
 def overlay(
-    image: Path_ | Image, program: Program | Path_, options: RenderOptions | None = None, **changes: Any
+    image: Path_ | Image, program: Program, options: RenderOptions | None = None, **changes: Any
 ) -> RenderedPicture:
     """The photo with the program drawn over it; `render` with `image`, for callers who start at the photo."""
     return render(program, options, image=image, **changes)

@@ -2,13 +2,12 @@
 
 import dataclasses
 from dataclasses import dataclass
-from os import PathLike, fspath
-from pathlib import Path
+from os import PathLike
 
 import numpy as np
 
 from p3i.errors import UsageError
-from p3i.paint.rectify_options import PICTURE_KINDS
+from p3i.paint.picture_kinds import PICTURE_KINDS, picture_kind
 from p3i.size import Size
 from p3i.vision.exif import reframed_exif
 from p3i.vision.image import Image
@@ -16,7 +15,6 @@ from p3i.vision.tiff import has_tifffile
 from p3i.vision.write import encode, write_bytes
 
 _WITHOUT_ALPHA = {"jpg"}
-_KINDS = {"png": "png", "jpg": "jpg", "jpeg": "jpg", "tif": "tiff", "tiff": "tiff", "webp": "webp"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,15 +74,6 @@ class Picture:
         written.
         """
         write_bytes(path, self.encode(kind or picture_kind(path)), force=force)
-
-
-def picture_kind(path: str | PathLike[str]) -> str:
-    """The kind of picture that a name asks for; raises UsageError for one that is not written."""
-    suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in _KINDS:
-        known = ", ".join(f".{kind}" for kind in _KINDS)
-        raise UsageError(f"cannot tell the kind of picture from {fspath(path)!r}: end the name in {known}")
-    return _KINDS[suffix]
 
 
 def depth(photo: Image) -> int:

@@ -15,9 +15,6 @@ Crop = Literal["pattern", "inside", "all", "same"]
 CROPS: tuple[Crop, ...] = get_args(Crop)
 """What of the plane a straightened view shows."""
 
-PICTURE_KINDS = ("png", "jpg", "tiff", "webp")
-"""The pictures that `rectify` and `tile` write."""
-
 _TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
 
 

@@ -8,9 +8,6 @@ import numpy as np
 from p3i.paint.scene import TO_BASELINE, Colour, Dots, Labels, Pixels, Scene, Strokes
 from p3i.vision.write import encode
 
-PROGRAM_TAG = "{urn:p3i}program"
-"""The element inside <metadata> that holds the program's text, as ElementTree names it."""
-
 
 def svg(scene: Scene, *, program_text: str) -> str:
     """The SVG document, with the text of its program in the metadata."""
@@ -42,7 +39,7 @@ def svg(scene: Scene, *, program_text: str) -> str:
 
 
 def program_element(text: str) -> str:
-    """The metadata that holds a program's text, where `read_program` finds it."""
+    """The metadata that holds a program's text, where `p3i.carried` finds it (p3i/marks.py)."""
     return f'<metadata><program xmlns="urn:p3i">{escape(_writable(text))}</program></metadata>'
 
 

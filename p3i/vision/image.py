@@ -59,7 +59,12 @@ def read_image(path: str | os.PathLike[str], *, max_px: int = MAX_PX) -> Image:
     animation the first frame (a note says so). Raises FileError, with a reason of its own for each: missing,
     a folder, no permission, empty, no picture, cut off, HEIC without its extra, more than `max_px` pixels.
     """
-    found = decode(read_bytes(path), name=_name(path), max_px=max_px)
+    return image_of(read_bytes(path), name=_name(path), max_px=max_px)
+
+
+def image_of(data: bytes, *, name: str, max_px: int = MAX_PX) -> Image:
+    """The photo that a file's bytes hold, as `read_image`; `name` is the file's in errors."""
+    found = decode(data, name=name, max_px=max_px)
     return Image(found.pixels, found.known, found.focal_mm, found.source, found.notes)
 
 

@@ -110,26 +110,6 @@ def encode(
     return buffer.getvalue()
 
 
-def read_png_text(data: bytes) -> dict[str, str]:
-    """The iTXt and tEXt entries of a PNG file's bytes, keyword -> text; empty where there are none."""
-    found: dict[str, str] = {}
-    if not data.startswith(b"\x89PNG\r\n\x1a\n"):
-        return found
-    position = 8
-    while position + 12 <= len(data):
-        length, kind = struct.unpack_from(">I4s", data, position)
-        body = data[position + 8 : position + 8 + length]
-        position += 12 + length
-        keyword, _, rest = body.partition(b"\0")
-        if kind == b"tEXt":
-            found[keyword.decode("latin-1")] = rest.decode("latin-1")
-        elif kind == b"iTXt" and rest[:2] == b"\0\0":  # not compressed, as p3i writes it
-            after_language = rest[2:].partition(b"\0")[2]
-            value = after_language.partition(b"\0")[2]
-            found[keyword.decode("latin-1")] = value.decode("utf-8", errors="replace")
-    return found
-
-
 def _png(
     array: np.ndarray, *, icc: bytes | None, exif: bytes | None, text: Mapping[str, str], dpi: float | None
 ) -> bytes:

@@ -144,7 +144,7 @@ def test_without_a_program_one_is_searched_for(folder: Path, capsys: pytest.Capt
         ("rectify photo.png ring.p3p --cell 1x1m -o a.png", 2, "needs a lattice"),
         ("rectify photo.png grid.p3p -o a.gif", 2, ".png"),
         ("rectify photo.png grid.p3p -o none/a.png", 3, "no folder"),
-        ("rectify photo.png grid.p3p -o .", 2, "is a folder"),
+        ("rectify photo.png grid.p3p -o .", 2, "is read here"),
         ("rectify photo.png grid.p3p -o photo.png --force", 2, "is read here"),
         ("rectify photo.png grid.p3p -o a.png --json a.png", 2, "both be written"),
         ("rectify photo.png grid.p3p -o a.png --crop most", 2, "crop"),

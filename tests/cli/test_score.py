@@ -26,6 +26,7 @@ class Evaluation:
     equation2: float
     edges: int
     normalised: float
+    objects: int = 9
 
 
 @pytest.fixture

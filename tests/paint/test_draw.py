@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from strategies import programs
 
 from p3i import loads
+from p3i.api import render
 from p3i.errors import FileError, P3IError, ProgramError, UsageError
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Polar, Program
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
-from p3i.paint.draw import overlay, render
+from p3i.paint.draw import overlay
 from p3i.paint.options import RenderOptions, kind_of
 from p3i.paint.scene import Dots, Strokes, rainbow
 from p3i.records import told

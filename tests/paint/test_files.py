@@ -9,14 +9,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from p3i.errors import FileError, ProgramError
-from p3i.paint.draw import render
+from p3i.api import render
 from p3i.paint.picture import Picture
-from p3i.paint.source import PNG_KEYWORD, read_program
 from p3i.paint.svg import joined, number
 from p3i.size import Size
 from p3i.vision.image import Image
-from p3i.vision.write import write_image
 
 SVG = "{http://www.w3.org/2000/svg}"
 TEASER = """\
@@ -97,36 +94,6 @@ def test_segments_that_follow_each_other_become_one_line() -> None:
     path = np.array([[[0, 0], [1, 0]], [[1, 0], [1, 1.5]], [[5, 5], [6, 6]]])
     assert joined(path) == [[("0", "0"), ("1", "0"), ("1", "1.5")], [("5", "5"), ("6", "6")]]
     assert [number(value) for value in (-0.001, 1.0, 2.504, -3.25)] == ["0", "1", "2.5", "-3.25"]
-
-
-def test_a_picture_without_a_program_is_no_program(tmp_path: Path) -> None:
-    write_image(tmp_path / "plain.png", np.zeros((4, 4, 3), np.uint8))
-    (tmp_path / "plain.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
-    (tmp_path / "broken.svg").write_text("<svg")
-    (tmp_path / "photo.jpg").write_bytes(b"\xff\xd8\xff\xe0 and so on")
-    (tmp_path / "page.pdf").write_bytes(b"%PDF-1.4")
-    for name, sentence in [
-        ("plain.png", "carries no program"),
-        ("plain.svg", "carries no program"),
-        ("broken.svg", "damaged"),
-        ("photo.jpg", "only PNG and SVG"),
-        ("page.pdf", "only PNG and SVG"),
-        ("missing.p3p", "no file"),
-        ("", "folder"),
-    ]:
-        with pytest.raises(FileError, match=sentence):
-            read_program(tmp_path / name)
-
-
-def test_a_program_with_errors_is_shown_with_its_place(tmp_path: Path) -> None:
-    wrong = tmp_path / "wrong.p3p"
-    wrong.write_text("Draw(x=i*j, y=0)")
-    with pytest.raises(ProgramError, match=r"wrong\.p3p:1"):
-        read_program(wrong)
-    carried = tmp_path / "carried.png"
-    write_image(carried, np.zeros((4, 4, 3), np.uint8), text={PNG_KEYWORD: "Draw(x=i*j, y=0)"})
-    with pytest.raises(ProgramError, match=r"carried\.png:1"):
-        read_program(carried)
 
 
 def test_a_deep_tiff_says_what_it_loses_without_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,8 @@ from PIL import ImageCms
 
 from p3i.errors import FileError, UsageError
 from p3i.vision.image import read_image, write_image
-from p3i.vision.write import encode, read_png_text
+from p3i.vision.text import png_text
+from p3i.vision.write import encode
 
 
 @pytest.fixture
@@ -159,9 +160,9 @@ def test_a_tiff_gives_its_camera_but_not_its_strips_to_a_jpeg(tmp_path, pixels):
 def test_text_is_kept_in_a_png(pixels):
     text = {"p3i": "SetCameraPose(rx=-42, ry=-15)\nfor i …", "Comment": ""}
     data = encode(pixels, kind=".png", text=text)
-    assert read_png_text(data) == text
+    assert png_text(data) == text
     assert Pil.open(io.BytesIO(data)).text == text  # pyright: ignore
-    assert read_png_text(b"no png") == {}
+    assert png_text(b"no png") == {}
 
 
 def test_text_is_found_in_a_png_of_another_writer(tmp_path, pixels):
@@ -170,16 +171,16 @@ def test_text_is_found_in_a_png_of_another_writer(tmp_path, pixels):
     info = PngInfo()
     info.add_text("p3i", "latin é")
     Pil.fromarray((pixels * 255).astype(np.uint8)).save(tmp_path / "a.png", pnginfo=info)
-    assert read_png_text((tmp_path / "a.png").read_bytes()) == {"p3i": "latin é"}
+    assert png_text((tmp_path / "a.png").read_bytes()) == {"p3i": "latin é"}
 
 
 def test_text_is_looked_for_in_damaged_files_without_an_error(pixels):
     data = encode(pixels, kind=".png", text={"p3i": "SetCameraPose(rx=1, ry=2)"})
     start = data.index(b"iTXt")
     for length in range(0, start + 60):
-        assert set(read_png_text(data[:length])) <= {"p3i", "p3", "p", ""}
+        assert set(png_text(data[:length])) <= {"p3i", "p3", "p", ""}
     for at in range(start, start + 20):
-        assert isinstance(read_png_text(data[:at] + b"\1" + data[at + 1 :]), dict)
+        assert isinstance(png_text(data[:at] + b"\1" + data[at + 1 :]), dict)
 
 
 def test_values_beyond_the_range_are_clipped_and_nan_is_black(tmp_path):

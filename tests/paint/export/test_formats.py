@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import p3i
+from p3i.carried import read_program
 from p3i.errors import UsageError
 from p3i.paint.clip import area
 from p3i.paint.objects import Objects
 from p3i.paint.points_options import FORMATS
-from p3i.paint.source import read_program
 
 GOLDEN = Path(__file__).parent / "golden"
 HEAD = "# /// p3p\n# version = 1\n# canvas = [640, 480]\n# ///\n"
