@@ -11,7 +11,7 @@ from typing import Annotated, Literal, get_args
 from p3i.errors import SketchError, UsageError
 from p3i.grammar.ast import Program
 from p3i.grammar.sketch import Sketch
-from p3i.records import Spelt, check_focal, told
+from p3i.records import Spelt, check_focal, fields_of
 
 Structure = Literal["auto", "lattice", "circular", "hybrid"]
 Extent = Literal["found", "image"]
@@ -89,8 +89,7 @@ class SearchConfig:
     def __post_init__(self) -> None:
         _one_of("structure", self.structure, STRUCTURES)
         if self.recipe == "paper":  # one configuration, whole
-            _, default = told(SearchConfig)
-            if self.features == default("features"):
+            if self.features == fields_of(SearchConfig)["features"].default:
                 object.__setattr__(self, "features", "rgb" if self.weights is None else "alexnet")
             object.__setattr__(self, "extent", "image")
         parts = [part.strip() for part in self.features.split("+")]
