@@ -5,23 +5,22 @@ import dataclasses
 import pytest
 
 from p3i.errors import UsageError
-from p3i.records import told
+from p3i.records import fields_of
 from p3i.search.config import FEATURES, SearchConfig
-
-sentence, default = told(SearchConfig)
 
 
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(SearchConfig)])
 def test_every_field_has_a_sentence_and_a_default(name: str) -> None:
-    assert sentence(name).endswith(".")
-    assert getattr(SearchConfig(), name) == default(name)
+    field = fields_of(SearchConfig)[name]
+    assert field.sentence.endswith(".")
+    assert getattr(SearchConfig(), name) == field.default
 
 
 def test_the_names_of_features_are_those_of_the_extractors() -> None:
     from p3i.vision.features import DEFAULT, EXTRACTORS
 
     assert tuple(EXTRACTORS) == FEATURES
-    assert default("features") == DEFAULT
+    assert fields_of(SearchConfig)["features"].default == DEFAULT
 
 
 def test_features_may_be_joined() -> None:
