@@ -62,21 +62,6 @@ def fields_of(record: type) -> Mapping[str, Field]:
     return found
 
 
-def told(record: type) -> tuple[Callable[[str], str], Callable[[str], Any]]:
-    """What documents a field of a record, and its default: two functions of its name.
-
-    Both raise KeyError for a name that is no field.
-    """
-
-    def sentence(name: str) -> str:
-        return fields_of(record)[name].sentence
-
-    def default(name: str) -> Any:
-        return fields_of(record)[name].default
-
-    return sentence, default
-
-
 def changed(options: Record, changes: Mapping[str, Any], *, verb: str) -> Record:
     """`options` with the fields of `changes`; raises UsageError for a field that it does not have."""
     known = {field.name for field in dataclasses.fields(options)}  # pyright: ignore[reportArgumentType]

@@ -20,8 +20,8 @@ def solve(task: Task, *, update, note=None) -> Outcome:
     if what == "leaves":
         os._exit(7)
     if what in ("hangs", "stubborn"):
-        Path(f"{task.photo.stem}.begun").touch()
         try:
+            Path(f"{task.photo.stem}.begun").touch()  # what waits for it may interrupt at once
             while True:
                 time.sleep(0.01)
         except KeyboardInterrupt:

@@ -37,8 +37,6 @@ class Input(click.Path):
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> str | bytes | os.PathLike[str]:
-        if value == "":
-            self.fail("an empty name names no file", param, ctx)
         if value == "-" and ctx is not None:
             if _READ in ctx.meta:
                 self.fail("only one input can be standard input", param, ctx)

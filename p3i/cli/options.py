@@ -72,21 +72,6 @@ def chosen(record: type[Record], given: Mapping[str, Any], **changes: Any) -> Re
     return record(**{name: given[name] for name in fields_of(record) if name in given} | changes)
 
 
-def field(record: type, name: str, *flags: str, **rest: Any) -> Decorator:
-    """One option of `of`, with other flags and other words for click.option."""
-    return of(record, name, **{name: {"flags": flags, **rest} if flags else rest})
-
-
-def focal(record: type) -> Decorator:
-    """`--focal MM`, in the words of a record's field `focal_mm`."""
-    return of(record, "focal_mm", focal_mm={"flags": ("--focal",), "metavar": "MM"})
-
-
-def max_px(record: type) -> Decorator:
-    """`--max-px N`, in the words of a record's field `max_px`."""
-    return of(record, "max_px", max_px={"metavar": "N"})
-
-
 class Value(click.ParamType):
     """What a field's `read` makes of a text; its UsageError or ValueError is one of the option."""
 

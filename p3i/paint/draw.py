@@ -12,6 +12,7 @@ from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
+from p3i.interp.degenerate import FAR, refuse_edge_on
 from p3i.interp.unroll import distinct, nest, points
 from p3i.marks import PNG_KEYWORD
 from p3i.paint import outlines, scene
@@ -20,7 +21,7 @@ from p3i.paint.lens import bent_points
 from p3i.paint.options import KINDS, RenderOptions, kind_of
 from p3i.paint.pdf import pdf
 from p3i.paint.photo import photo_layer, scaled
-from p3i.paint.placed import FAR, FocalSource, camera_of, refuse_edge_on
+from p3i.paint.placed import FocalSource, camera_of
 from p3i.paint.raster import paint
 from p3i.paint.sprite import lay, sprite_of
 from p3i.paint.svg import svg

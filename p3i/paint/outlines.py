@@ -13,9 +13,9 @@ import numpy as np
 import torch
 
 from p3i.grammar.ast import Polar
+from p3i.interp.degenerate import FAR
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
-from p3i.paint.placed import FAR
 
 DEFAULT_PITCH = 10.0
 """The spacing, in program units, that is assumed for an object that stands alone."""

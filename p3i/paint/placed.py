@@ -15,6 +15,7 @@ from p3i.errors import ProgramError
 from p3i.grammar.ast import Affine, Program
 from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
+from p3i.interp.degenerate import FAR, refuse_edge_on, refuse_far_steps
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import distinct, nest, points
 from p3i.paint.lens import bent_points
@@ -23,12 +24,6 @@ from p3i.vision.image import Image
 from p3i.vision.sheet import project
 
 FocalSource = Literal["option", "header", "exif", "default"]
-
-FAR = 1e6
-"""Objects farther from the origin than this, in program units, are left out: ten thousand pictures away."""
-
-# A plane whose normal leaves less than this of itself along the optical axis is seen edge-on: 0.0006 degrees.
-_EDGE_ON = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,28 +123,5 @@ def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> 
     )
     if not len(kept) or not result.centers_px()[1].any():
         raise ProgramError("the program draws nothing in front of its camera: `p3i check` says where it does")
-    _refuse_overflow(result)
+    refuse_far_steps(pattern, result.index)
     return result
-
-
-def refuse_edge_on(camera: Camera) -> None:
-    """Raise ProgramError where a camera sees its plane edge-on: as a line, on which no two points differ."""
-    if abs(camera.normal[2]) < _EDGE_ON:
-        raise ProgramError(
-            f"the plane is seen edge-on (rx={camera.rx_deg:g}, ry={camera.ry_deg:g}), as a line on which "
-            "nothing can be told apart: tilt it by less than 90 degrees"
-        )
-
-
-def _refuse_overflow(laid: Placed) -> None:
-    """ProgramError where a cell would reach farther than any picture: numbers overflow on the way there."""
-    loops = nest(laid.pattern.program)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for axis, loop in enumerate((loops.for_i, loops.for_j)):
-            half = 0.5 * (np.arange(2) == axis) * (loop is not None)
-            steps = np.abs(laid.at(laid.index + half) - laid.at(laid.index - half))
-            if not (steps < FAR).all():  # nan is none either
-                raise ProgramError(
-                    f"one step of the loop over {'ij'[axis]} goes farther than {FAR:,.0f} units, "
-                    "ten thousand pictures: write smaller numbers in Draw"
-                )

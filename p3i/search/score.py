@@ -11,8 +11,9 @@ import torch
 
 from p3i.errors import ProgramError
 from p3i.grammar.ast import Program
-from p3i.interp.camera import project
+from p3i.interp.camera import Camera, project
 from p3i.interp.compile import compile
+from p3i.interp.degenerate import refuse_edge_on, refuse_far_steps
 from p3i.interp.pattern import Pattern, without_doubles
 from p3i.search.config import SearchConfig
 from p3i.search.contrast import mean_contrast, placed_right, score_of, score_of_curve
@@ -46,7 +47,8 @@ def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation
     """Score a program on a photo, whatever it draws.
 
     The focal is that of the options, else the program's header, else the photo, else 35 mm; the lens is that
-    of the header. Raises ProgramError where fewer than two of the program's objects lie in the photo.
+    of the header. Raises ProgramError where fewer than two of the program's objects lie in the photo, and
+    for programs that no picture can show (p3i/interp/degenerate.py).
     """
     with limited_threads(config.threads):
         return _evaluated(image, program, config)
@@ -59,7 +61,9 @@ def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluati
     focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
     k1 = program.header.lens_k1 if program.header is not None else None
     evidence, program = _without_lens(Evidence(image, config, focal_mm), program, k1)
+    refuse_edge_on(Camera.of(program, focal_mm=evidence.focal_mm))
     pattern = without_doubles(compile(program))
+    refuse_far_steps(pattern, pattern.index.numpy())
     points, in_front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
     seen = in_front & in_frame(points, evidence.image.size)
     if int(seen.sum()) < 2:

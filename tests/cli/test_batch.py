@@ -8,6 +8,7 @@ import pytest
 
 from p3i.cli import batch
 from p3i.cli.batch import Answer, Made, Talk, exit_code, run
+from p3i.cli.streams import OutputError
 from p3i.cli.targets import Kinds, Targets, targets
 from p3i.errors import FileError, NoPatternError, UsageError
 
@@ -81,6 +82,27 @@ def test_a_file_that_cannot_be_written_costs_no_other(folder: Path, capsys) -> N
     (folder / "out" / "a.txt").mkdir()  # since it was checked
     assert run(inputs, work({}), to=found, talk=TALK) == 6
     assert (folder / "out" / "b.txt").read_text() == "b.jpg\n"
+
+
+@pytest.mark.parametrize("closed", [BrokenPipeError, OutputError])
+def test_a_standard_output_that_takes_no_more_ends_the_call(
+    closed: type[OSError], folder: Path, monkeypatch
+) -> None:
+    begun: list[str] = []
+
+    def one(name: str, update: batch.Update) -> Answer:
+        begun.append(name)
+        return work({})(name, update)
+
+    def refuse(data: object, *, err: bool = False, **_: object) -> None:
+        if not err:
+            raise closed(28, "no space left on device")
+
+    monkeypatch.setattr("click.echo", refuse)
+    both = ["a.jpg", "b.jpg"]
+    with pytest.raises(closed):
+        run(both, one, to=to(both, kinds=LINES), talk=TALK)
+    assert begun == ["a.jpg"]
 
 
 def test_an_interrupt_ends_the_call_and_keeps_what_was_written(folder: Path) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 from importlib import metadata
 from pathlib import Path
 
@@ -36,6 +37,13 @@ def test_people_read_the_same_facts_line_by_line(capsys) -> None:
     for name, line in zip(found, lines, strict=True):
         assert line.startswith(name)
     assert any(metadata.version("numpy") in line for line in lines)
+
+
+def test_every_extra_that_users_install_is_told(capsys) -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))[
+        "project"
+    ]
+    assert doctor(capsys)["extras"].keys() == project["optional-dependencies"].keys() - {"bench", "dev"}
 
 
 def test_an_extra_that_is_missing_is_told(capsys, monkeypatch) -> None:

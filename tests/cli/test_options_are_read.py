@@ -132,5 +132,9 @@ def test_every_field_of_a_record_of_options_is_read_by_what_does_the_work(record
                 case ast.Attribute(value=ast.Name(id=holder) | ast.Attribute(attr=holder), attr=name):
                     if holder in RECEIVERS:
                         read.add(name)
+    for name, value in vars(record).items():
+        if isinstance(value, property) and name in read:  # what it reads of the record is read through it
+            source = textwrap.dedent(inspect.getsource(value.fget))
+            read |= {node.attr for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute)}
     fields = {field.name for field in dataclasses.fields(record)}
     assert fields - read == set()

@@ -20,12 +20,10 @@ from p3i.interp.camera import Camera
 from p3i.paint.draw import overlay
 from p3i.paint.options import RenderOptions, kind_of
 from p3i.paint.scene import Dots, Strokes, rainbow
-from p3i.records import told
+from p3i.records import fields_of
 from p3i.size import Size
 from p3i.vision.image import Image, read_image
 from p3i.vision.write import write_image
-
-sentence, _ = told(RenderOptions)
 
 torch.set_num_threads(1)
 
@@ -337,8 +335,10 @@ def test_options_are_checked_and_documented() -> None:
     for wrong in ({"focal_mm": 0.0}, {"sprite_units": -1.0}, {"max_px": 0}, {"focal_mm": float("nan")}):
         with pytest.raises(UsageError):
             RenderOptions(**wrong)
-    for field in dataclasses.fields(RenderOptions):
-        assert sentence(field.name).endswith(".")
+    assert fields_of(RenderOptions).keys() == {field.name for field in dataclasses.fields(RenderOptions)}
+    for field in fields_of(RenderOptions).values():
+        assert field.sentence.endswith(".")
+        assert field.default == getattr(RenderOptions(), field.name)
 
 
 def test_a_guarded_outline_draws_only_its_cells() -> None:

@@ -6,11 +6,9 @@ import pytest
 
 from p3i.errors import UsageError
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.records import told
+from p3i.records import fields_of
 from p3i.search.config import FEATURES, STRUCTURES, SearchConfig, Structure
 from p3i.search.enumerate import sketches_by_length
-
-sentence, default = told(SearchConfig)
 
 SKETCH = parse_sketch("for j in range(0, 9):\n    Draw(x=9*j + ??, y=2*j)\n")
 assert isinstance(SKETCH, Sketch)
@@ -18,8 +16,9 @@ assert isinstance(SKETCH, Sketch)
 
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(SearchConfig)])
 def test_every_field_has_a_sentence_and_a_default(name: str) -> None:
-    assert sentence(name).endswith(".")
-    assert getattr(SearchConfig(), name) == default(name)
+    field = fields_of(SearchConfig)[name]
+    assert field.sentence.endswith(".")
+    assert getattr(SearchConfig(), name) == field.default
 
 
 def test_the_names_of_features_are_those_of_the_extractors() -> None:
