@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from p3i.paint.draw import RenderedPicture
     from p3i.paint.edit import Edited
+    from p3i.paint.export.listing import Listing
     from p3i.paint.extend import Extended
     from p3i.paint.inpaint import Inpainted
-    from p3i.paint.objects import Objects
     from p3i.paint.rectify import Rectified
     from p3i.paint.tile import Tile
     from p3i.vision.image import Image
@@ -87,7 +87,7 @@ def points(
     config: SearchConfig | None = None,
     progress: Progress | None = None,
     **changes: Any,
-) -> "Objects":
+) -> "Listing":
     """The objects of `program` with their places, names, cells and, on the photo `image`, their presence.
 
     `program` may be a photo, in memory or as a file: then its program is found first, by `config`. `changes`
@@ -96,6 +96,7 @@ def points(
     nothing in front of its camera, and NoPatternError for a photo without a pattern.
     """
     asked = changed(options or PointsOptions(), changes, verb="points")
+    from p3i.paint.export.listing import Listing
     from p3i.paint.objects import objects_of
 
     name = _file_name(image)
@@ -111,9 +112,9 @@ def points(
             image, name = either, named
     if image is None:
         assert given is not None
-        return objects_of(given, None, asked)
+        return Listing.of(objects_of(given, None, asked))
     photo, found = photo_and_program(image, given, config, progress=progress)
-    return objects_of(found, photo, asked, image=name)
+    return Listing.of(objects_of(found, photo, asked, image=name))
 
 
 def rectify(

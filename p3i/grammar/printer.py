@@ -62,6 +62,12 @@ def number_text(value: float) -> str:
     return str(int(value)) if value == int(value) and abs(value) < 1e16 else repr(value)
 
 
+def brief(value: float) -> str:
+    """A number to a hundredth, in as few characters as it takes: what pictures need of pixels."""
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
 def affine_text(affine: Affine) -> str:
     """An affine in canonical spelling, as messages quote it."""
     return _affine(affine, "", _NO_HOLES)

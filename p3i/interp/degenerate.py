@@ -25,7 +25,7 @@ def refuse_edge_on(camera: Camera) -> None:
 
 
 def refuse_far_steps(pattern: Pattern, index: np.ndarray) -> None:
-    """Raise ProgramError where a cell of `index` [M, 2] reaches farther than any picture: numbers overflow there."""
+    """Raise ProgramError where a cell at `index` [M, 2] reaches beyond all pictures: numbers overflow."""
     loops = nest(pattern.program)
     at = torch.as_tensor(index, dtype=torch.float64)
     for axis, loop in enumerate((loops.for_i, loops.for_j)):

@@ -5,8 +5,6 @@ The formats in p3i/paint/export have their own pixels and say so.
 """
 
 from dataclasses import dataclass, field
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,12 +18,11 @@ from p3i.paint.flat import Flat, flat_of
 from p3i.paint.lens import bent_points
 from p3i.paint.naming import Arrangement, Naming, named
 from p3i.paint.placed import Placed, placed
-from p3i.paint.points_options import PointsOptions, format_of
+from p3i.paint.points_options import PointsOptions
 from p3i.paint.presence import presence_of
 from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image
-from p3i.vision.write import write_bytes
 
 THERE = 0.5
 """An object whose presence is at least this counts as there."""
@@ -121,28 +118,6 @@ class Objects:
             f"expected {expected.width} columns x {expected.height} rows, "
             f"but found {self.columns} x {self.rows}"
         )
-
-    def encode(self, form: str) -> bytes:
-        """The list as a file of the format `form` (points_options.FORMATS); UsageError for another one."""
-        from p3i.paint.export.formats import encode
-
-        return encode(self, form)
-
-    def save(self, path: str | PathLike[str], *, form: str | None = None, force: bool = False) -> None:
-        """Write a file, whole or not at all, its format by the suffix unless `form` says; `-` is stdout.
-
-        Raises UsageError for an unknown format, FileError where the file exists (without `force`) or cannot
-        be written.
-        """
-        write_bytes(path, self.encode(form or format_of(path)), force=force)
-
-    def write_crops(
-        self, folder: str | PathLike[str], *, straight: bool = True, force: bool = False
-    ) -> tuple[Path, ...]:
-        """Write a picture of each object into `folder`, by its name (p3i/paint/crops.py)."""
-        from p3i.paint.crops import write_crops
-
-        return write_crops(self, folder, straight=straight, force=force)
 
 
 def objects_of(

@@ -8,8 +8,9 @@ import zlib
 
 import numpy as np
 
+from p3i.grammar.printer import brief
 from p3i.paint.scene import TO_BASELINE, Colour, Dots, Labels, Pixels, Scene, Strokes
-from p3i.paint.svg import joined, number
+from p3i.paint.svg import joined
 from p3i.vision.write import encode
 
 _POINTS_PER_PX = 0.75
@@ -45,14 +46,14 @@ def pdf(scene: Scene) -> bytes:
                 parts += _dots(layer)
             case Labels():
                 parts += _labels(layer)
-    states = " ".join(f"/O{k} << /CA {number(value)} >>" for k, value in enumerate(opacities))
+    states = " ".join(f"/O{k} << /CA {brief(value)} >>" for k, value in enumerate(opacities))
     named = " ".join(f"/P{k} {place} 0 R" for k, place in enumerate(pictures))
     with_text = any(isinstance(layer, Labels) for layer in scene.layers)
     font = "/Font << /F << /Type /Font /Subtype /Type1 /BaseFont /Helvetica >> >> " if with_text else ""
     objects[0] = b"<< /Type /Catalog /Pages 2 0 R >>"
     objects[1] = b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>"
     objects[2] = (
-        f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {number(width * scale)} {number(height * scale)}] "
+        f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {brief(width * scale)} {brief(height * scale)}] "
         f"/Contents 4 0 R /Resources << {font}/ExtGState << {states} >> /XObject << {named} >> >> >>"
     ).encode("ascii")
     objects[3] = _stream("/Filter /FlateDecode", zlib.compress("\n".join(parts).encode("ascii")))
@@ -67,17 +68,17 @@ def _strokes(strokes: Strokes, opacities: list[float]) -> str:
         for line in joined(strokes.segments)
     )
     state = opacities.index(strokes.opacity)
-    return f"q /O{state} gs {_rgb(strokes.colour)} RG {number(strokes.width)} w {path} S Q"
+    return f"q /O{state} gs {_rgb(strokes.colour)} RG {brief(strokes.width)} w {path} S Q"
 
 
 def _dots(dots: Dots) -> list[str]:
-    lines = [f"{number(dots.rim_width)} w"]
+    lines = [f"{brief(dots.rim_width)} w"]
     angles = np.radians(dots.angles_deg).tolist()
     for (x, y), (a, b), angle, colour, rim in zip(
         dots.centers.tolist(), dots.axes.tolist(), angles, dots.colours, dots.rims, strict=True
     ):
         cos, sin = math.cos(angle), math.sin(angle)
-        turn = f"{cos:.5f} {sin:.5f} {-sin:.5f} {cos:.5f} {number(x)} {number(y)} cm"
+        turn = f"{cos:.5f} {sin:.5f} {-sin:.5f} {cos:.5f} {brief(x)} {brief(y)} cm"
         lines.append(f"q {_rgb(colour)} rg {_rgb(rim)} RG {turn} {_ellipse(a, b)} b Q")
     return lines
 
@@ -90,19 +91,19 @@ def _labels(labels: Labels) -> list[str]:
             f"\\{ord(mark):03o}" if mark in "()\\" or not " " <= mark <= "~" else mark for mark in word
         )
         left = x - _HELVETICA * size * len(text) / 2
-        at = f"1 0 0 -1 {number(left)} {number(y + TO_BASELINE * size)} Tm ({word}) Tj"
+        at = f"1 0 0 -1 {brief(left)} {brief(y + TO_BASELINE * size)} Tm ({word}) Tj"
         # First the rim, then the letters over it.
-        lines += [f"{number(2 * rim)} w BT /F {number(size)} Tf {mode} Tr {at} ET" for mode in (1, 0)]
+        lines += [f"{brief(2 * rim)} w BT /F {brief(size)} Tf {mode} Tr {at} ET" for mode in (1, 0)]
     return lines
 
 
 def _ellipse(a: float, b: float) -> str:
-    curve = f"{number(a)} 0 m"
+    curve = f"{brief(a)} 0 m"
     for turn in range(4):
         cos, sin = (1, 0, -1, 0)[turn], (0, 1, 0, -1)[turn]
         quarter = ((1, _BEZIER), (_BEZIER, 1), (0, 1))
         points = ((a * (cos * u - sin * v), b * (sin * u + cos * v)) for u, v in quarter)
-        curve += "".join(f" {number(x)} {number(y)}" for x, y in points) + " c"
+        curve += "".join(f" {brief(x)} {brief(y)}" for x, y in points) + " c"
     return curve
 
 

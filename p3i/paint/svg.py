@@ -5,6 +5,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from p3i.grammar.printer import brief
+from p3i.marks import program_element
 from p3i.paint.scene import TO_BASELINE, Colour, Dots, Labels, Pixels, Scene, Strokes
 from p3i.vision.write import encode
 
@@ -38,22 +40,11 @@ def svg(scene: Scene, *, program_text: str) -> str:
     return "\n".join([*lines, "</svg>", ""])
 
 
-def program_element(text: str) -> str:
-    """The metadata that holds a program's text, where `p3i.carried` finds it (p3i/marks.py)."""
-    return f'<metadata><program xmlns="urn:p3i">{escape(_writable(text))}</program></metadata>'
-
-
-def number(value: float) -> str:
-    """A coordinate to a hundredth of a pixel, in as few characters as it takes."""
-    text = f"{value:.2f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text
-
-
 def joined(segments: np.ndarray) -> list[list[tuple[str, str]]]:
     """Segments [S, 2, 2] as polylines of printed coordinates, joined where one ends as the next begins."""
     lines: list[list[tuple[str, str]]] = []
     for (x0, y0), (x1, y1) in segments.tolist():
-        start, end = (number(x0), number(y0)), (number(x1), number(y1))
+        start, end = (brief(x0), brief(y0)), (brief(x1), brief(y1))
         if lines and lines[-1][-1] == start:
             lines[-1].append(end)
         else:
@@ -63,15 +54,15 @@ def joined(segments: np.ndarray) -> list[list[tuple[str, str]]]:
 
 def _strokes(strokes: Strokes) -> str:
     path = "".join("M" + "L".join(" ".join(point) for point in line) for line in joined(strokes.segments))
-    opacity = f' stroke-opacity="{number(strokes.opacity)}"' if strokes.opacity < 1 else ""
+    opacity = f' stroke-opacity="{brief(strokes.opacity)}"' if strokes.opacity < 1 else ""
     return (
-        f'<path d="{path}" fill="none" stroke="{_hex(strokes.colour)}" stroke-width="{number(strokes.width)}"'
+        f'<path d="{path}" fill="none" stroke="{_hex(strokes.colour)}" stroke-width="{brief(strokes.width)}"'
         f'{opacity} stroke-linecap="round" stroke-linejoin="round"/>'
     )
 
 
 def _dots(dots: Dots) -> list[str]:
-    lines = [f'<g stroke-width="{number(dots.rim_width)}">']
+    lines = [f'<g stroke-width="{brief(dots.rim_width)}">']
     for (x, y), (a, b), angle, colour, rim in zip(
         dots.centers.tolist(),
         dots.axes.tolist(),
@@ -81,8 +72,8 @@ def _dots(dots: Dots) -> list[str]:
         strict=True,
     ):
         lines.append(
-            f'<ellipse rx="{number(a)}" ry="{number(b)}" fill="{_hex(colour)}" stroke="{_hex(rim)}" '
-            f'transform="translate({number(x)} {number(y)}) rotate({number(angle)})"/>'
+            f'<ellipse rx="{brief(a)}" ry="{brief(b)}" fill="{_hex(colour)}" stroke="{_hex(rim)}" '
+            f'transform="translate({brief(x)} {brief(y)}) rotate({brief(angle)})"/>'
         )
     return [*lines, "</g>"]
 
@@ -94,8 +85,8 @@ def _labels(labels: Labels) -> list[str]:
     ]
     for text, (x, y), size, rim in labels.words():
         lines.append(
-            f'<text x="{number(x)}" y="{number(y + TO_BASELINE * size)}" font-size="{number(size)}" '
-            f'stroke-width="{number(2 * rim)}">{escape(text)}</text>'
+            f'<text x="{brief(x)}" y="{brief(y + TO_BASELINE * size)}" font-size="{brief(size)}" '
+            f'stroke-width="{brief(2 * rim)}">{escape(text)}</text>'
         )
     return [*lines, "</g>"]
 
@@ -107,13 +98,6 @@ def _data_of(values: np.ndarray) -> str:
     alpha = values[:, :, 3].astype(np.float32) / 255
     data = encode(np.ascontiguousarray(values[:, :, :3]), kind=".png", alpha=alpha)
     return "image/png;base64," + base64.b64encode(data).decode("ascii")
-
-
-def _writable(text: str) -> str:
-    """The text without the characters that XML cannot hold (a comment might)."""
-    return "".join(
-        mark if mark in "\n\t" or " " <= mark < "\ufffe" or mark > "\uffff" else "\ufffd" for mark in text
-    )
 
 
 def _hex(colour: Colour | np.ndarray) -> str:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from p3i.api import render
+from p3i.grammar.printer import brief
 from p3i.paint.picture import Picture
-from p3i.paint.svg import joined, number
+from p3i.paint.svg import joined
 from p3i.size import Size
 from p3i.vision.image import Image
 
@@ -93,7 +94,7 @@ def test_a_pdf_page_is_the_canvas_at_96_pixels_an_inch(teaser: Path) -> None:
 def test_segments_that_follow_each_other_become_one_line() -> None:
     path = np.array([[[0, 0], [1, 0]], [[1, 0], [1, 1.5]], [[5, 5], [6, 6]]])
     assert joined(path) == [[("0", "0"), ("1", "0"), ("1", "1.5")], [("5", "5"), ("6", "6")]]
-    assert [number(value) for value in (-0.001, 1.0, 2.504, -3.25)] == ["0", "1", "2.5", "-3.25"]
+    assert [brief(value) for value in (-0.001, 1.0, 2.504, -3.25)] == ["0", "1", "2.5", "-3.25"]
 
 
 def test_a_deep_tiff_says_what_it_loses_without_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:

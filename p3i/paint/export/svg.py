@@ -4,9 +4,9 @@ Convention: pixel centres at whole numbers, the view box begins at (-0.5, -0.5),
 object is a group `object-NAME`.
 """
 
-from p3i.grammar.printer import format_program, number_text
+from p3i.grammar.printer import brief, format_program, number_text
+from p3i.marks import program_element
 from p3i.paint.objects import Objects
-from p3i.paint.svg import number, program_element
 
 
 def svg(found: Objects) -> str:
@@ -18,7 +18,7 @@ def svg(found: Objects) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
         f'viewBox="-0.5 -0.5 {width} {height}">',
         program_element(format_program(found.program)),
-        f'<g id="objects" fill="none" stroke="#d62839" stroke-width="{number(stroke)}" '
+        f'<g id="objects" fill="none" stroke="#d62839" stroke-width="{brief(stroke)}" '
         'font-family="sans-serif" text-anchor="middle">',
     ]
     for each in found.objects:
@@ -30,9 +30,9 @@ def svg(found: Objects) -> str:
             corners = " ".join(f"{number_text(x)},{number_text(y)}" for x, y in each.cell_px)
             lines.append(f'<polygon points="{corners}"/>')
         x, y = number_text(each.x_px), number_text(each.y_px)
-        size = number(_text_size(each.cell_px, stroke))
+        size = brief(_text_size(each.cell_px, stroke))
         lines += [
-            f'<circle cx="{x}" cy="{y}" r="{number(1.5 * stroke)}"/>',
+            f'<circle cx="{x}" cy="{y}" r="{brief(1.5 * stroke)}"/>',
             f'<text x="{x}" y="{y}" dy="-0.5em" font-size="{size}" fill="#d62839" stroke="none">'
             f"{each.name}</text>",
             "</g>",
