@@ -33,8 +33,9 @@ from p3i.errors import P3IError
 from p3i.evaluation.measures import Measures, measure
 from p3i.evaluation.score_set import Row, summarise
 from p3i.evaluation.truth import Truth, read_truth
-from p3i.search import autocorrelation as by_shifts
-from p3i.search import evidence, register
+from p3i.search import register
+from p3i.search.look import evidence
+from p3i.search.propose import shifts as by_shifts
 
 Replacement = tuple[str, Callable[..., Any]]
 Rows = dict[tuple[str, str], dict[str, Any]]
@@ -160,19 +161,19 @@ def level_of_unit_energy(
 
 
 NO_REFINEMENT: tuple[Replacement, ...] = (
-    ("p3i.search.grow.refine", as_proposed),
-    ("p3i.search.grow.fit_instances", as_proposed),
-    ("p3i.search.objects.fit_instances", as_proposed),
+    ("p3i.search.fit.grow.refine", as_proposed),
+    ("p3i.search.fit.grow.fit_instances", as_proposed),
+    ("p3i.search.extent.layout.fit_instances", as_proposed),
 )
 NO_LOCAL: tuple[Replacement, ...] = (("p3i.vision.features.locally_normalized", as_they_are),)
 NO_LOCAL_ENERGY: tuple[Replacement, ...] = (("p3i.vision.features.locally_normalized", mean_taken_off),)
 NO_ENERGY: tuple[Replacement, ...] = (
-    ("p3i.search.evidence._level", level_of_unit_energy),
-    ("p3i.search.cells.agreement", difference_agreement),
-    ("p3i.search.grow.agreement", difference_agreement),
-    ("p3i.search.primitive.agreement", difference_agreement),
-    ("p3i.search.correlate.correlate", difference_correlate),
-    ("p3i.search.propose.lattice.autocorrelation", difference_autocorrelation),
+    ("p3i.search.look.evidence._level", level_of_unit_energy),
+    ("p3i.search.look.cells.agreement", difference_agreement),
+    ("p3i.search.fit.grow.agreement", difference_agreement),
+    ("p3i.search.extent.primitive.agreement", difference_agreement),
+    ("p3i.search.look.correlate.correlate", difference_correlate),
+    ("p3i.search.propose.windows.autocorrelation", difference_autocorrelation),
 )
 
 CONFIGURATIONS = {

@@ -28,9 +28,9 @@ from skimage.metrics import structural_similarity
 import p3i
 from p3i.evaluation.measures import measure
 from p3i.evaluation.truth import Truth, read_truth
-from p3i.paint.inpaint import inpaint
-from p3i.paint.inpaint_options import InpaintOptions
-from p3i.paint.placed import Placed, placed
+from p3i.options.inpaint import InpaintOptions
+from p3i.paint.fill.inpaint import inpaint
+from p3i.place.placed import Placed, placed
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
 

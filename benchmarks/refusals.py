@@ -29,12 +29,12 @@ import p3i
 from p3i.errors import P3IError
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.choose import by_explained
 from p3i.search.config import SearchConfig
-from p3i.search.evidence import Evidence
+from p3i.search.families import FAMILIES
+from p3i.search.judge.bits import by_explained
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
 from p3i.search.result import NEEDED
-from p3i.search.session import Session
-from p3i.search.sketches import FAMILIES
 from p3i.search.synthesize import focal_of
 from p3i.size import Size
 from p3i.vision.image import Image

@@ -26,8 +26,8 @@ from p3i.evaluation.scenes import Scene, lattice_scene
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, Program
 from p3i.interp.camera import Camera, project
 from p3i.interp.unroll import nest, points
-from p3i.paint.sprite import lay, sprite_of
-from p3i.paint.view import camera_view
+from p3i.paint.draw.sprite import lay, sprite_of
+from p3i.paint.draw.view import camera_view
 from p3i.search.config import SearchConfig
 from p3i.search.result import SynthesisResult
 from p3i.size import Size

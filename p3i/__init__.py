@@ -38,14 +38,14 @@ if TYPE_CHECKING:
     from p3i.grammar.sketch import Sketch
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
-    from p3i.paint.edit_options import EditOptions
-    from p3i.paint.extend_options import ExtendOptions, Margins, parse_margins
-    from p3i.paint.inpaint_options import InpaintOptions
-    from p3i.paint.options import RenderOptions
-    from p3i.paint.points_options import PointsOptions
-    from p3i.paint.rectify_options import CellSize, RectifyOptions, parse_cell
-    from p3i.paint.show_options import ShowOptions
-    from p3i.paint.tile_options import TileOptions
+    from p3i.options.edit import EditOptions
+    from p3i.options.extend import ExtendOptions, Margins, parse_margins
+    from p3i.options.inpaint import InpaintOptions
+    from p3i.options.points import PointsOptions
+    from p3i.options.rectify import CellSize, RectifyOptions, parse_cell
+    from p3i.options.render import RenderOptions
+    from p3i.options.show import ShowOptions
+    from p3i.options.tile import TileOptions
     from p3i.search.config import SearchConfig
     from p3i.search.result import Candidate, StopReason, SynthesisResult
     from p3i.size import Size
@@ -54,52 +54,52 @@ if TYPE_CHECKING:
 _HOMES = {
     "Camera": "p3i.interp.camera",
     "Candidate": "p3i.search.result",
-    "CellSize": "p3i.paint.rectify_options",
+    "CellSize": "p3i.options.rectify",
     "check": "p3i.language",
     "Diagnostic": "p3i.grammar.diagnostics",
     "dump": "p3i.language",
     "dumps": "p3i.language",
     "edit": "p3i.api",
-    "EditOptions": "p3i.paint.edit_options",
+    "EditOptions": "p3i.options.edit",
     "eval_set": "p3i.api",
     "examples": "p3i.api",
     "expand": "p3i.language",
     "extend": "p3i.api",
-    "ExtendOptions": "p3i.paint.extend_options",
+    "ExtendOptions": "p3i.options.extend",
     "FileError": "p3i.errors",
     "format": "p3i.language",
     "Image": "p3i.vision.image",
     "inpaint": "p3i.api",
-    "InpaintOptions": "p3i.paint.inpaint_options",
+    "InpaintOptions": "p3i.options.inpaint",
     "load": "p3i.language",
     "load_sketch": "p3i.language",
     "loads": "p3i.language",
-    "Margins": "p3i.paint.extend_options",
+    "Margins": "p3i.options.extend",
     "NoPatternError": "p3i.errors",
     "P3IError": "p3i.errors",
-    "parse_cell": "p3i.paint.rectify_options",
-    "parse_margins": "p3i.paint.extend_options",
+    "parse_cell": "p3i.options.rectify",
+    "parse_margins": "p3i.options.extend",
     "ParseError": "p3i.grammar.parse_error",
     "points": "p3i.api",
-    "PointsOptions": "p3i.paint.points_options",
+    "PointsOptions": "p3i.options.points",
     "Program": "p3i.grammar.ast",
     "ProgramError": "p3i.errors",
     "read_image": "p3i.api",
     "rectify": "p3i.api",
-    "RectifyOptions": "p3i.paint.rectify_options",
+    "RectifyOptions": "p3i.options.rectify",
     "render": "p3i.api",
-    "RenderOptions": "p3i.paint.options",
+    "RenderOptions": "p3i.options.render",
     "score": "p3i.api",
     "SearchConfig": "p3i.search.config",
     "show": "p3i.api",
-    "ShowOptions": "p3i.paint.show_options",
+    "ShowOptions": "p3i.options.show",
     "Size": "p3i.size",
     "Sketch": "p3i.grammar.sketch",
     "StopReason": "p3i.search.result",
     "synth": "p3i.api",
     "SynthesisResult": "p3i.search.result",
     "tile": "p3i.api",
-    "TileOptions": "p3i.paint.tile_options",
+    "TileOptions": "p3i.options.tile",
     "trace": "p3i.api",
     "UsageError": "p3i.errors",
 }

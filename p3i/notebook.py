@@ -59,7 +59,7 @@ def _drawing(program: Program) -> str:
         count = len(live_indices(program))
         if count > _MOST_DRAWN:
             return f"<p>{count:,} draws are too many to show here: `p3i.render` draws them</p>"
-        from p3i.paint.draw import render
+        from p3i.paint.draw.render import render
 
         document = render(program).encode("svg").decode("utf-8")
     except P3IError as error:

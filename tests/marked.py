@@ -3,8 +3,8 @@
 import numpy as np
 
 from p3i import loads
-from p3i.paint.cells import moves, nearest
-from p3i.paint.placed import placed
+from p3i.place.moves import moves, nearest
+from p3i.place.placed import placed
 from p3i.vision.image import Image
 
 LATTICE = """SetCameraPose(rx=-30, ry=10)

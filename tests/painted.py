@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 
 from p3i import loads
-from p3i.paint.npn.gather import Stack, gather
-from p3i.paint.npn.lessons import lessons
-from p3i.paint.npn.paint import part_on_window
-from p3i.paint.npn.window import Bank, Pyramid, bank_of, window_of
-from p3i.paint.placed import Placed, placed
+from p3i.paint.fill.npn.gather import Stack, gather
+from p3i.paint.fill.npn.lessons import lessons
+from p3i.paint.fill.npn.paint import part_on_window
+from p3i.paint.fill.npn.window import Bank, Pyramid, bank_of, window_of
+from p3i.place.placed import Placed, placed
 from p3i.vision.image import Image
 
 PROGRAM = """SetCameraPose(rx=-20, ry=8)

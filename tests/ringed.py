@@ -3,10 +3,10 @@
 from p3i.evaluation.scene import Scene
 from p3i.grammar.leaves import leaves
 from p3i.search.config import SearchConfig
-from p3i.search.curves import curve_score, follow, measured, numbers_of
-from p3i.search.evidence import Evidence
+from p3i.search.fit.places import curve_score, follow, measured, numbers_of
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
 from p3i.search.rings import FoundRing, ring_filling
-from p3i.search.session import Session
 
 MOVING = ("draw.x.radius.1", "draw.x.offset.1", "draw.y.offset.1")
 FIXED = ("camera.rx", "camera.ry", "draw.x.angle.1", "draw.x.angle.j")

@@ -11,8 +11,8 @@ from p3i.grammar.ast import Affine, Program
 from p3i.interp.camera import Camera, rotation
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
-from p3i.search.evidence import Evidence, Level
-from p3i.search.lattice import Lattice, lattice_pattern
+from p3i.search.forms.lattice import Lattice, lattice_pattern
+from p3i.search.look.evidence import Evidence, Level
 from p3i.size import Size
 
 torch.set_num_threads(1)

@@ -10,27 +10,27 @@ from p3i.api.search import Progress, photo_and_program, read_image, without
 from p3i.carried import read_either, read_program
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
-from p3i.paint.edit_options import EditOptions
-from p3i.paint.extend_options import ExtendOptions
-from p3i.paint.inpaint_options import InpaintOptions
-from p3i.paint.options import RenderOptions
-from p3i.paint.points_options import PointsOptions
-from p3i.paint.rectify_options import RectifyOptions
-from p3i.paint.show_options import ShowOptions
-from p3i.paint.tile_options import TileOptions
+from p3i.options.edit import EditOptions
+from p3i.options.extend import ExtendOptions
+from p3i.options.inpaint import InpaintOptions
+from p3i.options.points import PointsOptions
+from p3i.options.rectify import RectifyOptions
+from p3i.options.render import RenderOptions
+from p3i.options.show import ShowOptions
+from p3i.options.tile import TileOptions
 from p3i.records import changed
 from p3i.search.config import SearchConfig
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from p3i.paint.draw import RenderedPicture
-    from p3i.paint.edit import Edited
-    from p3i.paint.export.listing import Listing
-    from p3i.paint.extend import Extended
-    from p3i.paint.inpaint import Inpainted
-    from p3i.paint.rectify import Rectified
-    from p3i.paint.tile import Tile
+    from p3i.export.listing import Listing
+    from p3i.paint.draw.render import RenderedPicture
+    from p3i.paint.edit.edit import Edited
+    from p3i.paint.edit.extend import Extended
+    from p3i.paint.fill.inpaint import Inpainted
+    from p3i.paint.straight.rectify import Rectified
+    from p3i.paint.straight.tile import Tile
     from p3i.vision.image import Image
 
 
@@ -48,10 +48,10 @@ def render(
     `program` may be a file: its text, or a PNG or SVG that was drawn here before. `sprite` is a picture for
     every object; pictures named in the program are looked up beside its file, or in the folder `beside`. The
     result has `pixels()`, `encode(kind)` and `save(path)`. Raises FileError, ParseError and UsageError, as
-    p3i.paint.draw.render, which draws.
+    p3i.paint.draw.render.render, which draws.
     """
     asked = changed(options or RenderOptions(), changes, verb="render")
-    from p3i.paint.draw import render as draw
+    from p3i.paint.draw.render import render as draw
 
     if beside is None and isinstance(program, str | os.PathLike):
         beside = Path(program).parent
@@ -73,7 +73,7 @@ def show(
     `pixels()`, `encode(kind)` and `save(path)`. Raises as `points`.
     """
     asked = changed(options or ShowOptions(), changes, verb="show")
-    from p3i.paint.show import show as draw
+    from p3i.paint.draw.show import show as draw
 
     image, found = photo_and_program(photo, program, config, progress=progress)
     return draw(image, found, asked)
@@ -96,8 +96,8 @@ def points(
     nothing in front of its camera, and NoPatternError for a photo without a pattern.
     """
     asked = changed(options or PointsOptions(), changes, verb="points")
-    from p3i.paint.export.listing import Listing
-    from p3i.paint.objects import objects_of
+    from p3i.export.listing import Listing
+    from p3i.place.objects import objects_of
 
     name = _file_name(image)
     given = program if isinstance(program, Program) else None
@@ -133,7 +133,7 @@ def rectify(
     photo, and NoPatternError for a photo without a pattern.
     """
     asked = changed(options or RectifyOptions(), changes, verb="rectify")
-    from p3i.paint.rectify import rectify as straighten
+    from p3i.paint.straight.rectify import rectify as straighten
 
     image, found = photo_and_program(photo, program, config, progress=progress)
     return straighten(image, found, asked)
@@ -155,7 +155,7 @@ def tile(
     nor rings or has no object on the photo, and NoPatternError for a photo without a pattern.
     """
     asked = changed(options or TileOptions(), changes, verb="tile")
-    from p3i.paint.tile import tile as make
+    from p3i.paint.straight.tile import tile as make
 
     image, found = photo_and_program(photo, program, config, progress=progress)
     return make(image, found, asked)
@@ -180,7 +180,7 @@ def inpaint(
     ParseError, UsageError, ProgramError for a program without objects on the photo, and NoPatternError.
     """
     asked = changed(options or InpaintOptions(), changes, verb="inpaint")
-    from p3i.paint.inpaint import inpaint as fill
+    from p3i.paint.fill.inpaint import inpaint as fill
 
     image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
     if isinstance(mask, str | os.PathLike):
@@ -208,7 +208,7 @@ def extend(
     UsageError where the picture would reach the horizon, ProgramError and NoPatternError.
     """
     asked = changed(options or ExtendOptions(), changes, verb="extend")
-    from p3i.paint.extend import extend as continue_photo
+    from p3i.paint.edit.extend import extend as continue_photo
 
     image, found = photo_and_program(photo, program, config, progress=progress)
     return continue_photo(image, found, asked, progress=progress)
@@ -231,7 +231,7 @@ def edit(
     FileError, ParseError, UsageError, ProgramError for a program without objects, and NoPatternError.
     """
     asked = changed(options or EditOptions(), changes, verb="edit")
-    from p3i.paint.edit import edit as lay_anew
+    from p3i.paint.edit.edit import edit as lay_anew
 
     wanted = _in_memory(new)
     image, found = photo_and_program(photo, old, config, progress=progress)

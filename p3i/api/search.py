@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from p3i.evaluation.score_set import SetScore
-    from p3i.paint.film import Film
-    from p3i.search.score import Evaluation
+    from p3i.paint.draw.film import Film
+    from p3i.search.judge.evaluate import Evaluation
     from p3i.size import Size
     from p3i.vision.image import Image
 
@@ -95,7 +95,7 @@ def score(
     NoPatternError for a photo without a pattern.
     """
     asked = changed(config or SearchConfig(), options, verb="score")
-    from p3i.search.score import evaluate
+    from p3i.search.judge.evaluate import evaluate
 
     image, given = photo_and_program(photo, program, asked, progress=progress)
     return evaluate(image, given, asked)
@@ -130,7 +130,7 @@ def trace(trace: str | os.PathLike[str], *, image: str | os.PathLike[str] | None
     `image` is the photo where the trace's own name of it does not lead there, or picks one search of several.
     The result has `frames`, `notes` and `encode(kind)`. Raises FileError (with the line) and UsageError.
     """
-    from p3i.paint.film import film_of
+    from p3i.paint.draw.film import film_of
 
     return film_of(files.named(trace), image=None if image is None else os.fspath(image))
 

@@ -8,7 +8,7 @@ from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.inputs import photos_and_programs
 from p3i.cli.pictures import PICTURES, made, prepared
 from p3i.errors import UsageError
-from p3i.paint.edit_options import EditOptions
+from p3i.options.edit import EditOptions
 
 
 @grouped.command("edit")

@@ -9,7 +9,7 @@ from p3i import api
 from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made
 from p3i.errors import UsageError
-from p3i.paint.extend_options import ExtendOptions, Margins, parse_margins
+from p3i.options.extend import ExtendOptions, Margins, parse_margins
 
 
 @grouped.command("extend")

@@ -7,7 +7,7 @@ import click
 from p3i import api
 from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made
-from p3i.paint.inpaint_options import InpaintOptions
+from p3i.options.inpaint import InpaintOptions
 
 
 @grouped.command("inpaint")

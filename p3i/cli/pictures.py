@@ -10,12 +10,12 @@ from p3i.cli.inputs import Inputs, photos_and_programs
 from p3i.cli.targets import Kinds, Targets, targets
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
-from p3i.paint.options import KINDS
-from p3i.paint.picture_kinds import BY_SUFFIX, LOSSY
+from p3i.options.render import KINDS
+from p3i.vision.picture_kinds import BY_SUFFIX, LOSSY
 
 if TYPE_CHECKING:
-    from p3i.paint.draw import RenderedPicture
-    from p3i.paint.picture import Picture
+    from p3i.paint.draw.render import RenderedPicture
+    from p3i.vision.picture import Picture
 
 PICTURES = Kinds(by_suffix=BY_SUFFIX)
 """Photos that were changed."""

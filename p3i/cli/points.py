@@ -13,7 +13,7 @@ from p3i.cli.inputs import PROGRAMS, Inputs, files, names_one, photos_and_progra
 from p3i.cli.photos import SUFFIXES
 from p3i.cli.pictures import prepared
 from p3i.cli.targets import Kinds
-from p3i.paint.points_options import BY_SUFFIX, FORMATS, PointsOptions
+from p3i.options.points import BY_SUFFIX, FORMATS, PointsOptions
 from p3i.size import parse_size
 
 UNEXPECTED = 1

@@ -8,7 +8,7 @@ from p3i import api
 from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made, stored_anew
 from p3i.errors import UsageError
-from p3i.paint.rectify_options import RectifyOptions
+from p3i.options.rectify import RectifyOptions
 
 
 @grouped.command("rectify")

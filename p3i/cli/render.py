@@ -13,7 +13,7 @@ from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.inputs import PROGRAMS, files
 from p3i.cli.pictures import DRAWINGS, drawn
 from p3i.errors import UsageError
-from p3i.paint.options import RenderOptions
+from p3i.options.render import RenderOptions
 
 _POLL_S = 0.2
 

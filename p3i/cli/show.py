@@ -5,7 +5,7 @@ from typing import Any
 from p3i import api
 from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import DRAWINGS, Job, drawn, each_photo
-from p3i.paint.show_options import ShowOptions
+from p3i.options.show import ShowOptions
 
 
 @grouped.command("show")

@@ -5,7 +5,7 @@ from typing import Any
 from p3i import api
 from p3i.cli import batch, grouped, inputs, options, targets
 from p3i.cli.pictures import PICTURES, Job, each_photo, made
-from p3i.paint.tile_options import TileOptions
+from p3i.options.tile import TileOptions
 
 
 @grouped.command("tile")

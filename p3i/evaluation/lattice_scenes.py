@@ -18,8 +18,8 @@ from p3i.evaluation.scene import Scene, as_sprite, least_distance, on_canvas
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Program
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest, points
-from p3i.paint.sprite import lay
-from p3i.paint.view import camera_view
+from p3i.paint.draw.sprite import lay
+from p3i.paint.draw.view import camera_view
 from p3i.size import Size
 
 _SIZE = Size(640, 480)

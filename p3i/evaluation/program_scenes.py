@@ -10,8 +10,8 @@ from p3i.evaluation.scene import Scene, as_sprite, on_canvas
 from p3i.grammar.ast import Polar, Program
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import affine_at, nest, points
-from p3i.paint.sprite import lay
-from p3i.paint.view import camera_view
+from p3i.paint.draw.sprite import lay
+from p3i.paint.draw.view import camera_view
 from p3i.search.result import StructureFound
 from p3i.size import Size
 

@@ -10,7 +10,7 @@ from p3i.evaluation.ring_looks import DOTS, MARKS, pointed, shrunk
 from p3i.evaluation.ring_plan import STRAY, RingOptions, Staged
 from p3i.evaluation.scene import Scene, as_sprite, on_canvas
 from p3i.interp.unroll import points
-from p3i.paint.sprite import lay
+from p3i.paint.draw.sprite import lay
 from p3i.search.result import StructureFound
 
 _CONTRAST = 32.0

@@ -10,7 +10,7 @@ from p3i.evaluation.looks import Random
 from p3i.evaluation.ring_layout import RingLayout, pose_sigma_deg
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
-from p3i.paint.view import View, camera_view
+from p3i.paint.draw.view import View, camera_view
 from p3i.size import Size
 
 STRAY = 0.004

@@ -7,8 +7,8 @@ import numpy as np
 from p3i.grammar.ast import Program
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
-from p3i.paint.sprite import Sprite, sprite_of
-from p3i.paint.view import camera_view
+from p3i.paint.draw.sprite import Sprite, sprite_of
+from p3i.paint.draw.view import camera_view
 from p3i.search.result import StructureFound
 from p3i.size import Size
 from p3i.vision.decode import Source

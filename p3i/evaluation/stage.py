@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from p3i.evaluation.looks import Random, random_colour
-from p3i.paint.view import View
+from p3i.paint.draw.view import View
 from p3i.vision.decode import decode, swap_red_blue
 
 

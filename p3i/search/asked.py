@@ -13,14 +13,14 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.enumerate import sketches_by_length
-from p3i.search.fill import draws, whole_program_sketch
+from p3i.search.families import FAMILIES
+from p3i.search.forms.filling import draws, whole_program_sketch
+from p3i.search.forms.settings import check_settings
+from p3i.search.forms.sketches import sketches_by_length
+from p3i.search.look.session import Session
 from p3i.search.paper import find_by_paper
 from p3i.search.result import NEEDED, StopReason
-from p3i.search.session import Session
-from p3i.search.settings import check_settings
 from p3i.search.sketched import WALKED, find_by_sketch, structure_of
-from p3i.search.sketches import FAMILIES
 from p3i.size import Size
 
 # A sketch that draws fewer objects than this fixes neither camera nor pattern.

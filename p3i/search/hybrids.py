@@ -1,7 +1,7 @@
 """Hybrids on a photo: rings around one centre, arcs that grow from ring to ring, a ring along a line.
 
 Each starts from a ring that was found by itself: with its pose, the other rings lie open on the straightened
-plane (propose/hybrid.py). Then all numbers are fitted together, as with a single ring.
+plane (propose/repeats.py). Then all numbers are fitted together, as with a single ring.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,13 +13,13 @@ import torch
 
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.search.answer import Answer
-from p3i.search.choose import explained_bits
-from p3i.search.curves import CurveFit, curve_score, follow, measured, numbers_of, values_of
-from p3i.search.fill import Filling, filling_of
-from p3i.search.patches import spacing
-from p3i.search.propose.hybrid import BaseRing, HybridProposal, ring_repeated, rings_around
+from p3i.search.fit.places import CurveFit, curve_score, follow, measured, numbers_of, values_of
+from p3i.search.forms.filling import Filling, filling_of
+from p3i.search.judge.bits import explained_bits
+from p3i.search.look.patches import spacing
+from p3i.search.look.session import Session
+from p3i.search.propose.repeats import BaseRing, HybridProposal, ring_repeated, rings_around
 from p3i.search.rings import FoundRing, answer_of, found_rings
-from p3i.search.session import Session
 from p3i.search.table1 import hybrid_in_table1
 
 # A ring that is less sure than this starts nothing.

@@ -4,17 +4,17 @@ import numpy as np
 
 from p3i.interp.pattern import Pattern
 from p3i.search.answer import Answer
-from p3i.search.contrast import score_of
-from p3i.search.elsewhere import with_note_of_others
-from p3i.search.evidence import Evidence
-from p3i.search.grow import Fit, follow, grow
-from p3i.search.guess import Proposal
-from p3i.search.lattice import Lattice, lattice_pattern, map_from_index
-from p3i.search.objects import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
-from p3i.search.primitive import primitive
-from p3i.search.propose.lattice import straightened_proposals, window_proposals
+from p3i.search.extent.layout import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
+from p3i.search.extent.primitive import primitive
+from p3i.search.fit.grow import Fit, follow, grow
+from p3i.search.forms.guess import Proposal
+from p3i.search.forms.lattice import Lattice, lattice_pattern, map_from_index
+from p3i.search.judge.elsewhere import with_note_of_others
+from p3i.search.look.contrast import score_of
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
+from p3i.search.propose.windows import straightened_proposals, window_proposals
 from p3i.search.result import NEEDED
-from p3i.search.session import Session
 
 # So many proposals of each kind are looked at, and so many fits that differ are grown in all.
 _MOST_PROPOSALS = 10

@@ -15,11 +15,11 @@ from torch import Tensor
 from p3i.interp.camera import image_from_plane, project
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
-from p3i.search.evidence import COARSE, Evidence
-from p3i.search.lattice import Lattice, lattice_pattern
-from p3i.search.objects import Layout, filling_layout
-from p3i.search.score import score_of_program
-from p3i.search.session import Session
+from p3i.search.extent.layout import Layout, filling_layout
+from p3i.search.forms.lattice import Lattice, lattice_pattern
+from p3i.search.judge.evaluate import score_of_program
+from p3i.search.look.evidence import COARSE, Evidence
+from p3i.search.look.session import Session
 from p3i.vision.features import FeatureMap
 from p3i.vision.warp import in_frame, sample, sample_valid
 

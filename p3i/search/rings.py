@@ -8,12 +8,12 @@ import numpy as np
 
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.curves import CurveFit, curve_score, follow, measured, numbers_of, values_of
-from p3i.search.fill import Filling, filling_of
-from p3i.search.propose.ring import RingProposal, ring_proposals
+from p3i.search.extent.sector import Place, Ring, places
+from p3i.search.fit.places import CurveFit, curve_score, follow, measured, numbers_of, values_of
+from p3i.search.forms.filling import Filling, filling_of
+from p3i.search.look.session import Session
+from p3i.search.propose.votes import RingProposal, ring_proposals
 from p3i.search.result import StructureFound
-from p3i.search.sector import Place, Ring, places
-from p3i.search.session import Session
 from p3i.search.table1 import ring_in_table1
 
 # So many proposals are fitted, and so many fits are finished.

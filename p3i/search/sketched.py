@@ -1,8 +1,8 @@
 """A sketch that a person wrote (or the enumerator) -> programs: grid, climb, registration, extent, score.
 
-No family is known here. The coarse grid looks at single points (coarse.py, climb.py); the best fillings are
-fitted to where their objects really lie (curves.py), the extents are read off which objects are there, and
-numbers that a person bounded stay within their bounds all the way.
+No family is known here. The coarse grid looks at single points (propose/grid.py, propose/climb.py); the best
+fillings are fitted to where their objects really lie (fit/places.py), the extents are read off which objects
+are there, and numbers that a person bounded stay within their bounds all the way.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,9 @@ from p3i.grammar.sketch import Sketch
 from p3i.interp.compile import compile
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
-from p3i.search.borrowed import written_in
-from p3i.search.centring import centred, standing_out
-from p3i.search.climb import distinct, search_grid
-from p3i.search.coarse import PointMaps
-from p3i.search.curves import CurveFit, follow, measured
-from p3i.search.fill import (
+from p3i.search.extent.centring import centred, standing_out
+from p3i.search.fit.places import CurveFit, follow, measured
+from p3i.search.forms.filling import (
     Filling,
     fillings,
     kept_within,
@@ -30,13 +27,16 @@ from p3i.search.fill import (
     unknowns_of,
     with_settings,
 )
-from p3i.search.guess import Found
-from p3i.search.patches import half_steps, patch_contrast
+from p3i.search.forms.guess import Found
+from p3i.search.forms.settings import best_setting, widened
+from p3i.search.forms.written import written_in
+from p3i.search.judge.evaluate import score_of_program
+from p3i.search.look.patches import half_steps, patch_contrast
+from p3i.search.look.session import Session
+from p3i.search.look.thinned import thinned
+from p3i.search.propose.climb import distinct, search_grid
+from p3i.search.propose.grid import PointMaps
 from p3i.search.result import StructureFound
-from p3i.search.score import score_of_program
-from p3i.search.session import Session
-from p3i.search.settings import best_setting, widened
-from p3i.search.thinned import thinned
 
 
 @dataclass(frozen=True, slots=True)

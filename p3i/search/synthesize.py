@@ -11,14 +11,17 @@ from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
-from p3i.search.choose import by_explained
 from p3i.search.config import SearchConfig
-from p3i.search.distinct import distinct_answers
-from p3i.search.evidence import FINE, Evidence
-from p3i.search.focal import with_own_focal
-from p3i.search.lens import find_with_lens
-from p3i.search.mirrored import ambiguity_note, mirrored_camera
-from p3i.search.region import centers_px, region_px
+from p3i.search.families import FAMILIES
+from p3i.search.judge.bits import by_explained
+from p3i.search.judge.evaluate import score_of_program
+from p3i.search.judge.region import centers_px, region_px
+from p3i.search.judge.same import distinct_answers
+from p3i.search.look.evidence import FINE, Evidence
+from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
+from p3i.search.optics.focal import with_own_focal
+from p3i.search.optics.lens import find_with_lens
+from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
 from p3i.search.result import (
     FOCAL_REASONS,
     Candidate,
@@ -26,9 +29,6 @@ from p3i.search.result import (
     StopReason,
     SynthesisResult,
 )
-from p3i.search.score import score_of_program
-from p3i.search.session import TRACE_VERSION, Progress, Session, Trace
-from p3i.search.sketches import FAMILIES
 from p3i.search.table1 import unwritable_note, within_table1
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads

@@ -13,11 +13,11 @@ import numpy as np
 from p3i.grammar.departures import departures
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.search.answer import Answer
-from p3i.search.curves import CurveFit, curve_score, follow, measured, numbers_of, values_of
-from p3i.search.fill import filling_of
-from p3i.search.region import centers_px
+from p3i.search.fit.places import CurveFit, curve_score, follow, measured, numbers_of, values_of
+from p3i.search.forms.filling import filling_of
+from p3i.search.judge.region import centers_px
+from p3i.search.look.session import Session
 from p3i.search.result import NEEDED
-from p3i.search.session import Session
 
 _ROUNDS = 3
 _NAMES = {"lattice": "a lattice", "circular": "a ring", "hybrid": "a hybrid"}

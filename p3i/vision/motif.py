@@ -2,7 +2,7 @@
 
 A cell repeats without a border of its own, so it is a torus: arrays [C, n, n] or [n, n] whose opposite
 sides meet. Each cue is an array [n, n]: entry [y, x] says how much speaks for an object centred on sample
-(x, y). None of them is sure of itself; p3i.search.phase weighs them against each other.
+(x, y). None of them is sure of itself; p3i.search.extent.phase weighs them against each other.
 """
 
 import cv2

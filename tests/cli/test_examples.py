@@ -10,7 +10,7 @@ import p3i
 from p3i.cli.main import run
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
-from p3i.paint.view import camera_view
+from p3i.paint.draw.view import camera_view
 
 FEW = ["--lattices", "1", "--rings", "2", "--hybrids", "1", "--seed", "3"]
 

@@ -9,7 +9,7 @@ import pytest
 
 from p3i.cli import render as shell
 from p3i.cli.main import run
-from p3i.paint.options import KINDS
+from p3i.options.render import KINDS
 from p3i.vision.image import read_image
 from p3i.vision.write import write_image
 

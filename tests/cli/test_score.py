@@ -38,9 +38,9 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[tuple]:
         calls.append((image.size, program, config))
         return Evaluation(equation2=12.3456789, edges=12, normalised=0.654321)
 
-    module = types.ModuleType("p3i.search.score")
+    module = types.ModuleType("p3i.search.judge.evaluate")
     module.evaluate = evaluate  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "p3i.search.score", module)
+    monkeypatch.setitem(sys.modules, "p3i.search.judge.evaluate", module)
     monkeypatch.chdir(tmp_path)
     cv2.imwrite("a.png", np.zeros((48, 64, 3), np.uint8))
     Path("a.p3p").write_text(TEXT)

@@ -11,8 +11,8 @@ from truth import small_scene
 import p3i
 from p3i.cli.main import run
 from p3i.grammar.printer import format_program
-from p3i.paint.film import MOST_FRAMES, evenly, film_of
-from p3i.paint.steps import read_steps
+from p3i.paint.draw.film import MOST_FRAMES, evenly, film_of
+from p3i.paint.draw.steps import read_steps
 from p3i.search.config import SearchConfig
 from p3i.search.synthesize import synthesize
 from p3i.vision.write import write_image

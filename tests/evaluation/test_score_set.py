@@ -77,7 +77,7 @@ def test_the_truth_itself_gets_full_marks(kind, tmp_path: Path) -> None:
 
 
 def test_the_same_view_through_another_lens_costs_nothing(lattice: Scene, tmp_path: Path) -> None:
-    from p3i.search.focal import refocused
+    from p3i.search.optics.focal import refocused
 
     assert lattice.program.header is not None
     told = refocused(lattice.program, from_mm=35, to_mm=60)

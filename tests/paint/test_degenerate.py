@@ -7,8 +7,8 @@ import pytest
 
 import p3i
 from p3i.errors import P3IError, ProgramError
-from p3i.paint.crops import crops
-from p3i.paint.extend_options import Margins
+from p3i.export.crops import crops
+from p3i.options.extend import Margins
 from p3i.vision.image import Image
 
 GRID = """SetCameraPose(rx={rx}, ry={ry})

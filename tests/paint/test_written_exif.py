@@ -11,14 +11,14 @@ from PIL import Image as Pil
 
 from p3i import loads
 from p3i.grammar.ast import Program
-from p3i.paint.edit import edit
-from p3i.paint.extend import extend
-from p3i.paint.extend_options import Margins
-from p3i.paint.inpaint import inpaint
-from p3i.paint.picture import Picture, picture_kind
-from p3i.paint.rectify import rectify
-from p3i.paint.tile import tile
+from p3i.options.extend import Margins
+from p3i.paint.edit.edit import edit
+from p3i.paint.edit.extend import extend
+from p3i.paint.fill.inpaint import inpaint
+from p3i.paint.straight.rectify import rectify
+from p3i.paint.straight.tile import tile
 from p3i.vision.image import Image, read_image
+from p3i.vision.picture import Picture, picture_kind
 
 PROGRAM = loads(LATTICE)
 SPARSER = loads(LATTICE.replace("9*i", "18*i").replace("range(-4, 5)", "range(-2, 3)"))

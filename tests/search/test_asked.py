@@ -11,9 +11,9 @@ from p3i.interp.camera import Camera
 from p3i.search import asked, sketched
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.evidence import Evidence
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
 from p3i.search.result import NEEDED, StopReason
-from p3i.search.session import Session
 from p3i.search.synthesize import synthesize
 from p3i.size import Size
 

@@ -8,7 +8,7 @@ from p3i.errors import UsageError
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.records import fields_of
 from p3i.search.config import FEATURES, STRUCTURES, SearchConfig, Structure
-from p3i.search.enumerate import sketches_by_length
+from p3i.search.forms.sketches import sketches_by_length
 
 SKETCH = parse_sketch("for j in range(0, 9):\n    Draw(x=9*j + ??, y=2*j)\n")
 assert isinstance(SKETCH, Sketch)

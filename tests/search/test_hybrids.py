@@ -18,8 +18,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.curves import CurveFit
-from p3i.search.evidence import Evidence
+from p3i.search.fit.places import CurveFit
 from p3i.search.hybrids import (
     _drawn_once,
     _evenly_sure,
@@ -27,10 +26,11 @@ from p3i.search.hybrids import (
     find_hybrids,
     hybrid_filling,
 )
-from p3i.search.propose.hybrid import HybridProposal
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
+from p3i.search.propose.repeats import HybridProposal
 from p3i.search.result import NEEDED
 from p3i.search.rings import numbers_of
-from p3i.search.session import Session
 
 SCENES = {"concentric": 12, "fan": 9, "row": 14}
 PROPOSAL = HybridProposal(

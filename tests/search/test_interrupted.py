@@ -15,13 +15,14 @@ import p3i
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.program_scenes import program_scene
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.search import asked, climb, hybrids, paper, rings, sketched
-from p3i.search import lens as lens_module
+from p3i.search import asked, hybrids, paper, rings, sketched
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.propose.ring import RingProposal
+from p3i.search.look.session import Session
+from p3i.search.optics import lens as lens_module
+from p3i.search.propose import climb
+from p3i.search.propose.votes import RingProposal
 from p3i.search.result import StopReason, SynthesisResult
-from p3i.search.session import Session
 from p3i.search.synthesize import synthesize
 from p3i.size import Size
 from p3i.vision.image import Image
@@ -136,9 +137,9 @@ IN_A_CALL = [
     ("hybrid", "hybrids._grow", 1),
     ("hybrid", "hybrids.measured", 2),
     ("hybrid", "hybrids.explained_bits", 1),
-    ("sketch", "climb.score_points", 3),
-    ("sketch", "climb.distinct_share", 6),
-    ("sketch", "climb._descended", 1),
+    ("sketch", "propose.climb.score_points", 3),
+    ("sketch", "propose.climb.distinct_share", 6),
+    ("sketch", "propose.climb._descended", 1),
     ("sketch", "sketched.distinct", 1),
     ("sketch", "sketched._on_objects", 1),
     ("sketch", "sketched._centred", 2),
@@ -155,7 +156,7 @@ def test_an_interrupt_within_a_step_keeps_the_best_so_far(
     monkeypatch: pytest.MonkeyPatch, kind: str, name: str, turn: int
 ) -> None:
     search = SEARCHES[kind](monkeypatch)
-    file, _, function = name.partition(".")
+    file, _, function = name.rpartition(".")
     module = importlib.import_module(f"p3i.search.{file}")
     stop = Once(turn, getattr(module, function))
     monkeypatch.setattr(module, function, stop)

@@ -9,8 +9,8 @@ from p3i.evaluation.program_scenes import program_scene
 from p3i.interp.compile import compile
 from p3i.search import paper
 from p3i.search.config import SearchConfig
-from p3i.search.evidence import COARSE, Evidence
-from p3i.search.score import evaluate
+from p3i.search.judge.evaluate import evaluate
+from p3i.search.look.evidence import COARSE, Evidence
 from p3i.size import Size
 
 # Its loops reach beyond the picture on all sides.

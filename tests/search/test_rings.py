@@ -16,11 +16,11 @@ from p3i.grammar.ast import Polar
 from p3i.grammar.parser import parse
 from p3i.interp.unroll import nest, points
 from p3i.search.config import SearchConfig
-from p3i.search.curves import measured
-from p3i.search.evidence import Evidence
+from p3i.search.fit.places import measured
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
 from p3i.search.result import NEEDED, StopReason
 from p3i.search.rings import _extended, find_rings, ring_filling
-from p3i.search.session import Session
 from p3i.search.synthesize import synthesize
 
 RING = DrawnRing()

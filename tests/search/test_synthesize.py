@@ -22,9 +22,9 @@ from p3i.search import lattices
 from p3i.search import synthesize as synthesize_module
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.grow import measure
+from p3i.search.families import Family
+from p3i.search.fit.grow import measure
 from p3i.search.result import NEEDED, StopReason, SynthesisResult
-from p3i.search.sketches import Family
 from p3i.search.synthesize import focal_of, synthesize
 from p3i.size import Size
 from p3i.vision.image import Image

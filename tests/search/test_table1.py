@@ -18,9 +18,9 @@ from p3i.search import hybrids, rings
 from p3i.search import synthesize as synthesize_module
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.propose.ring import RingProposal
+from p3i.search.families import Family
+from p3i.search.propose.votes import RingProposal
 from p3i.search.result import StopReason, SynthesisResult
-from p3i.search.sketches import Family
 from p3i.search.synthesize import synthesize
 
 ON_PHASE = DrawnRing(first_deg=0.0)

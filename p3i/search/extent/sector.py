@@ -1,0 +1,140 @@
+"""Where on its ring an object sits: the common sector of a ring, and the place in it that stands out.
+
+That a ring repeats says nothing of the radius and the angle at which its objects lie: every circle about the
+centre repeats as well. As with lattices (phase.py), what tells is looked at in the common cell: here a
+sector, unrolled so that it is as wide as it is high. First the radius at which most of the drawing repeats,
+then the middle of what is drawn there.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.search.extent.phase import WEIGHTS
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.unrolled import colours_at, gradients, polar_points
+from p3i.vision.cells import median_cell
+from p3i.vision.motif import concentration, contrast, parts, symmetry
+
+Floats = NDArray[np.float32]
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Samples along the sector's arc, and as many to a like distance along the radius.
+_SIDE = 24
+# The object's radius is looked for this far to both sides of the fit's, as a factor.
+_REACH = 1.55
+# Peaks of the profile of at least this share of the highest are told.
+_LEAST_PEAK = 0.5
+# The profile is smoothed by this share of a sector's side.
+_SMOOTH = 0.12
+# How much the profile speaks beside the cues of phase.py.
+_PROFILE = 6.0
+# The object's middle lies this close to the radius where most repeats, in sector sides.
+_NEAR = 0.17
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ring:
+    """A circle of objects on the plane: `center` [2] and `radius` in program units, angles in degrees.
+
+    `index` [N] are the objects to look at, of which each stands at first_deg + step_deg * index; `weights`
+    [N] say how sure each is. `image_from_plane` [3, 3] takes program units to photo pixels.
+    """
+
+    center: Array
+    radius: float
+    first_deg: float
+    step_deg: float
+    index: Array
+    weights: Array
+    image_from_plane: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A radius (program units) and a turn (degrees, to be added to first_deg) at which objects may lie."""
+
+    radius: float
+    turn_deg: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sectors:
+    """The sectors of a ring side by side: Lab [R, N * _SIDE, 3], known [R, N * _SIDE], radii [R]."""
+
+    lab: Floats
+    known: Mask
+    radii: Array
+
+    def cut(self, values: NDArray, rows: slice) -> NDArray:
+        """Rows of values [..., R, N * _SIDE] sector by sector: [N, ..., rows, _SIDE]."""
+        part = values[..., rows, :]
+        return np.moveaxis(part.reshape(*part.shape[:-1], -1, _SIDE), -2, 0)
+
+
+def places(evidence: Evidence, ring: Ring) -> list[Place]:
+    """The radii at which most repeats, the best first, each with the turn that puts draws on objects."""
+    sectors = _sectors(evidence, ring)
+    everything = slice(0, len(sectors.radii))
+    known = sectors.cut(sectors.known, everything)
+    cells = sectors.cut(gradients(sectors.lab), everything)
+    weight = ring.weights.clip(0.02)[:, None, None] * known
+    template = (cells * weight[:, None]).sum(0) / np.maximum(weight.sum(0), 1e-6)
+    template -= template.mean(2, keepdims=True)
+    energy = (template**2).sum(0).mean(1) * (known.mean((0, 2)) > 0.5)
+    profile = cv2.GaussianBlur(energy[:, None], (1, 0), 1.0, sigmaY=_SMOOTH * _SIDE)[:, 0]
+    widened = cv2.dilate(profile[:, None], np.ones((_SIDE // 2 + 1, 1)))[:, 0]
+    half = _SIDE // 2
+    peaks = np.flatnonzero((profile == widened) & (profile > 0))
+    peaks = peaks[(peaks >= half) & (peaks < len(profile) - half)]
+    found = []
+    for row in sorted(peaks, key=lambda row: -profile[row]):
+        if profile[row] < _LEAST_PEAK * profile[peaks].max():
+            break
+        rows = slice(row - half, row + half)
+        cell = np.asarray(template[:, rows], np.float32)
+        down, turn = _middle(sectors, ring, cell, rows, profile[rows] / profile[row])
+        radius = float(np.interp(row + down, np.arange(len(profile)), sectors.radii))
+        found.append(Place(radius, turn * ring.step_deg))
+    return found
+
+
+def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
+    """The photo about each object, unrolled: angle to the right, log radius down, alike in scale."""
+    step = math.radians(ring.step_deg)
+    inside = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
+    angles = (math.radians(ring.first_deg) + (ring.index[:, None] + inside) * step).reshape(-1)
+    reach = math.log(_REACH) + abs(step) / 2
+    radii = ring.radius * np.exp(np.arange(-reach, reach, abs(step) / _SIDE))
+    colours = evidence.colours_for(ring.radius * abs(step) / _SIDE * evidence.image.size.unit_px)
+    matrix = colours.map_from_photo.numpy() @ ring.image_from_plane
+    at, known = polar_points(colours, matrix, ring.center, radii, angles)
+    return Sectors(colours_at(colours, at), known, radii)
+
+
+def _middle(
+    sectors: Sectors, ring: Ring, template: Floats, rows: slice, profile: Array
+) -> tuple[float, float]:
+    """The object's middle in a sector: samples down from the middle row, and turn in steps (-1/2 to 1/2).
+
+    The cues take the cell for a torus, which it is along the arc; so only rows near the middle are asked.
+    """
+    colours = np.stack([sectors.cut(plane, rows) for plane in np.moveaxis(sectors.lab, -1, 0) / 100], 1)
+    weights = ring.weights.clip(0)  # where none is sure, all are asked
+    sure = np.flatnonzero(weights >= 0.5 * weights.max())
+    median, _ = median_cell(np.asarray(colours, np.float32), sectors.cut(sectors.known, rows), sure)
+    cues = {
+        "symmetry": symmetry(template),
+        "contrast": contrast(median),
+        "parts": parts(median),
+        "texture": concentration((template**2).sum(0)),
+    }
+    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items()) + _PROFILE * profile[:, None]
+    down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
+    worth = np.where(np.abs(down)[:, None] < _NEAR, worth, -np.inf)
+    y, x = divmod(int(np.argmax(worth)), _SIDE)
+    return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)

@@ -1,0 +1,190 @@
+"""Fitting programs that draw on curves (rings, rings in rings, any sketch) to the objects on a photo.
+
+Each object is searched for around its place by correlation with the mean patch (patches.py), and the
+program's free numbers, the focal among them where it is free, are fitted to the places found.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from p3i.interp.camera import project
+from p3i.search.fit.robust import robust_fit
+from p3i.search.forms.filling import Filling
+from p3i.search.look.contrast import mean_contrast, placed_right, score_of_curve
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
+
+FOCALS_MM = (20.0, 80.0)
+"""Within these a focal that nobody stated may go, 35 mm-equivalent."""
+# Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise.
+_FOCAL_SPREAD = 0.35
+# The certainty of a focal that is held.
+_HELD = 1e12
+# One step moves angles by at most so many degrees, lengths by this share of a patch, the focal's logarithm
+# by this.
+_MOST_TURN_DEG = 4.0
+_MOST_SHIFT = 0.4
+_MOST_ZOOM = 0.15
+_FEWEST = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveFit:
+    """A filled sketch on a photo: its free numbers `z` [F], the focal (mm), and how its objects agree.
+
+    `index` [N, 2] are the objects in sight, `contrast` [N] how well each is predicted by the others beyond
+    half a step, `side` the patches' side in program units; `cost` the robust misfit of the objects' places.
+    """
+
+    filling: Filling
+    z: Tensor
+    focal_mm: float
+    side: float
+    index: Tensor
+    contrast: Tensor
+    cost: float = math.inf
+
+    @property
+    def theta(self) -> Tensor:
+        """The numbers of the generator, [P]."""
+        return self.filling.theta(self.z)
+
+    @property
+    def mean(self) -> float:
+        """The mean contrast: `mean_contrast`."""
+        return mean_contrast(self.contrast)
+
+    @property
+    def quality(self) -> float:
+        """The mean contrast, less where the objects do not stand where the program draws."""
+        return placed_right(self.mean, self.cost)
+
+
+def measured(
+    evidence: Evidence, filling: Filling, z: Tensor, *, focal_mm: float, side: float | None = None
+) -> CurveFit | None:
+    """How well the objects of a filled sketch, z [F], predict each other; None for fewer than three."""
+    theta = filling.theta(z)
+    pattern = filling.pattern
+    if side is None:
+        side = spacing(pattern, theta)
+    index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
+    if len(index) < _FEWEST:
+        return None
+    found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
+    return CurveFit(filling, z, focal_mm, side, index, found.contrast)
+
+
+def registered(
+    evidence: Evidence, fit: CurveFit, *, free_focal: bool = False, keep_side: bool = False
+) -> CurveFit | None:
+    """One round: find the objects around their places, fit the numbers to where they are; None if too few.
+
+    `keep_side`: the patches stay as wide as they are, whatever becomes of the distance of the draws.
+    """
+    filling, pattern = fit.filling, fit.filling.pattern
+    weights = fit.contrast.clamp(min=0.02)
+    found = find_objects(
+        evidence, pattern, fit.theta, fit.index, weights, side=fit.side, focal_mm=fit.focal_mm
+    )
+    certainty = found.certainty.double()
+    if int((certainty > 0).sum()) < _FEWEST:
+        return None
+    size = evidence.image.size
+    where = frames(pattern, fit.theta, fit.index, side=fit.side)
+    matrix = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm)
+    targets, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
+    whiten = whitening(matrix, where)
+
+    def points_of(numbers: Tensor) -> Tensor:
+        theta = filling.theta(numbers[..., :-1])
+        seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[..., -1].exp())
+        return project(seen, pattern.points_at(fit.index, theta))[0]
+
+    def fitted(focal_mm: float, *, expected_mm: float, certainty_of_focal: float) -> Tensor:
+        start = torch.cat([fit.z, torch.tensor([math.log(focal_mm)], dtype=torch.float64)])
+        prior = torch.zeros(len(start), 2, dtype=torch.float64)
+        prior[-1, 0], prior[-1, 1] = math.log(expected_mm), certainty_of_focal
+        return robust_fit(
+            points_of,
+            start,
+            targets=targets,
+            whiten=whiten,
+            weights=certainty,
+            limits=_limits(fit),
+            prior=prior,
+            iterations=8,
+        )
+
+    def under(focal_mm: float) -> Tensor:
+        return fitted(focal_mm, expected_mm=focal_mm, certainty_of_focal=_HELD)
+
+    focal_mm = fit.focal_mm
+    if free_focal:
+        expected = evidence.focal_mm
+        numbers = fitted(focal_mm, expected_mm=expected, certainty_of_focal=1 / _FOCAL_SPREAD**2)
+        told = float(numbers[-1].exp())
+        focal_mm = min(max(told, FOCALS_MM[0]), FOCALS_MM[1])
+        if focal_mm != told and math.isfinite(
+            told
+        ):  # the other numbers are to belong to the focal that stays
+            numbers = under(focal_mm)
+    else:
+        numbers = under(focal_mm)
+    if not bool(torch.isfinite(numbers).all()):
+        return None
+    cost = misfit(points_of(numbers) - targets, whiten=whiten, certainty=certainty)
+    side = fit.side if keep_side else None
+    moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm, side=side)
+    return None if moved is None else replace(moved, cost=cost)
+
+
+def follow(
+    evidence: Evidence, fit: CurveFit, *, rounds: int, free_focal: bool = False, keep_side: bool = False
+) -> CurveFit:
+    """The best of some rounds of registration; the options are those of `registered`."""
+    best = now = fit
+    for _ in range(rounds):
+        moved = registered(evidence, now, free_focal=free_focal, keep_side=keep_side)
+        if moved is None:
+            break
+        settled = abs(moved.mean - now.mean) < 0.003 and moved.cost > 0.98 * now.cost
+        now = moved
+        if now.quality > best.quality:
+            best = now
+        if settled:
+            break
+    return best
+
+
+def curve_score(fit: CurveFit) -> float:
+    """The score, 0 to 1, of a program that was fitted: `score_of_curve` of its quality."""
+    return score_of_curve(fit.quality, len(fit.contrast))
+
+
+def values_of(fit: CurveFit) -> dict[str, float]:
+    """The numbers of a fit by the names of their unknowns, such as draw.x.radius.1."""
+    return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
+
+
+def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:
+    """The numbers of a filling [F] in its order."""
+    return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
+
+
+def _limits(fit: CurveFit) -> Tensor:
+    """The most that one step may move each free number and the logarithm of the focal, [F + 1]."""
+    radius = max(float(fit.filling.pattern.centers(fit.theta).std(0).norm()), fit.side)
+    limits = []
+    for unknown in fit.filling.moving:
+        name = unknown.name
+        if name.startswith("camera."):
+            limits.append(_MOST_TURN_DEG)
+        elif ".angle." in name:
+            limits.append(math.degrees(_MOST_SHIFT * fit.side / radius))
+        else:
+            limits.append(_MOST_SHIFT * fit.side)
+    return torch.tensor([*limits, _MOST_ZOOM], dtype=torch.float64)

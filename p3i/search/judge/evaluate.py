@@ -1,0 +1,124 @@
+"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score.
+
+The score is a function of photo and finished program (with the focal and the lens of its header) alone: what
+`synth` prints of its answers and what `p3i score` says. What each family knew besides while it searched only
+decides what it goes on with, and may refuse an answer that this score would let pass.
+"""
+
+from dataclasses import dataclass
+
+import torch
+
+from p3i.errors import ProgramError
+from p3i.grammar.ast import Program
+from p3i.interp.camera import Camera, project
+from p3i.interp.compile import compile
+from p3i.interp.degenerate import refuse_edge_on, refuse_far_steps
+from p3i.interp.pattern import Pattern, without_doubles
+from p3i.search.config import SearchConfig
+from p3i.search.fit.judged import judged_cells, judged_patches, sweeps_cells
+from p3i.search.forms.whole import scaled
+from p3i.search.look.contrast import mean_contrast, placed_right, score_of, score_of_curve
+from p3i.search.look.evidence import FINE, Evidence
+from p3i.search.look.straight import straightened
+from p3i.vision.image import Image
+from p3i.vision.threads import limited_threads
+from p3i.vision.warp import in_frame, sample, sample_valid
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """A program on a photo.
+
+    `equation2`: the paper's loss, the sum over `edges` neighbouring pairs of draws, both in sight, of the
+    squared difference of their features. `normalised`: the mean over the objects in sight of how much better
+    the others predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
+    perfect. `synth` prints the same for its answers, from the finished program. `objects`: how many are in
+    sight.
+    """
+
+    equation2: float
+    edges: int
+    normalised: float
+    objects: int
+
+
+def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation:
+    """Score a program on a photo, whatever it draws.
+
+    The focal is that of the options, else the program's header, else the photo, else 35 mm; the lens is that
+    of the header. Raises ProgramError where fewer than two of the program's objects lie in the photo, and
+    for programs that no picture can show (p3i/interp/degenerate.py).
+    """
+    with limited_threads(config.threads):
+        return _evaluated(image, program, config)
+
+
+def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluation:
+    """`evaluate`, however many threads there are."""
+    header = program.header.focal_mm if program.header is not None else None
+    given = None if config.focal_mm == "auto" else config.focal_mm
+    focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
+    k1 = program.header.lens_k1 if program.header is not None else None
+    evidence, program = _without_lens(Evidence(image, config, focal_mm), program, k1)
+    refuse_edge_on(Camera.of(program, focal_mm=evidence.focal_mm))
+    pattern = without_doubles(compile(program))
+    refuse_far_steps(pattern, pattern.index.numpy())
+    points, in_front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
+    seen = in_front & in_frame(points, evidence.image.size)
+    if int(seen.sum()) < 2:
+        raise ProgramError(f"{int(seen.sum())} of the program's objects lie in the photo; a score needs two")
+    loss, pairs = _equation2(evidence, pattern, points, seen)
+    return Evaluation(loss, pairs, normalised_score(evidence, pattern), int(seen.sum()))
+
+
+def score_of_program(
+    evidence: Evidence, program: Program, *, focal_mm: float | None = None, lens_k1: float | None = None
+) -> float:
+    """The normalised score of a program as `evaluate` gives it, on a photo that is being looked at already.
+
+    `focal_mm` is the program's own, None for the one that `evidence` assumes; `lens_k1` as in its header. 0
+    where fewer than two objects lie in the photo.
+    """
+    evidence = evidence if focal_mm is None else evidence.under(focal_mm)
+    evidence, program = _without_lens(evidence, program, lens_k1)
+    pattern = without_doubles(compile(program))
+    return normalised_score(evidence, pattern) if int(evidence.in_sight(pattern).sum()) >= 2 else 0.0
+
+
+def _without_lens(evidence: Evidence, program: Program, k1: float | None) -> tuple[Evidence, Program]:
+    """A program is judged as it was found: on the photo freed of its lens, in units of that canvas."""
+    if not k1:
+        return evidence, program
+    free = straightened(evidence.image, k1)
+    looked_at = Evidence(free.image, evidence.config, evidence.focal_mm / free.scale, free.points_on_photo)
+    return looked_at, scaled(program, 1 / free.scale)
+
+
+def normalised_score(evidence: Evidence, pattern: Pattern) -> float:
+    """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`.
+
+    `pattern` draws no point twice. Cells are judged in the features that show most; curves and single rows at
+    the place of their sector that shows most.
+    """
+    if sweeps_cells(pattern):
+        return max((score_of(found.contrast) for found in judged_cells(evidence, pattern)), default=0.0)
+    best = 0.0
+    for found in judged_patches(evidence, pattern):
+        mean, count = mean_contrast(found.contrast), len(found.contrast)
+        if score_of_curve(mean, count) > best:
+            best = max(best, score_of_curve(placed_right(mean, found.misfit()), count))
+    return best
+
+
+def _equation2(
+    evidence: Evidence, pattern: Pattern, points: torch.Tensor, seen: torch.Tensor
+) -> tuple[float, int]:
+    """The loss as printed, on the features of the fine map, and the number of its pairs."""
+    features = evidence.features(FINE)
+    at, _ = project(features.map_from_photo, points)
+    known = seen & sample_valid(features.valid, at.float())
+    pairs = pattern.edges[known[pattern.edges].all(1)]
+    values = sample(features.values, at.float())
+    difference = values[pairs[:, 0]] - values[pairs[:, 1]]
+    return float(difference.square().sum()), len(pairs)

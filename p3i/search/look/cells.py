@@ -1,0 +1,134 @@
+"""Cells: the stretch of plane around each draw, read off the feature map and compared.
+
+A cell is what fractional loop indices sweep: the points of (i + a, j + b) with a, b in [-1/2, 1/2). Under a
+lattice that is the fundamental cell, under concentric rings a sector of a ring, and so for any program. The
+neighbours of equation 2 are whole steps of the index; half steps of it are where the pattern must NOT look
+the same, else the cell is a multiple of the true one, or there is no pattern but a smooth picture.
+
+Convention: N cells, K samples a cell, C channels; `index` float64 [N, 2]; values [N, K, C], known [N, K].
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from p3i.interp.camera import project
+from p3i.interp.pattern import Pattern
+from p3i.search.look.evidence import Level
+from p3i.vision.warp import sample, sample_valid
+
+HALF_STEPS = torch.tensor([[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], dtype=torch.float64)
+"""The half steps of a two-directional index."""
+SIDE = 6
+"""Samples along a cell's side wherever cells are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """The features of N cells at K samples each: values [N, K, C], known [N, K] bool."""
+
+    values: Tensor
+    known: Tensor
+
+
+def sample_grid(side: int = SIDE) -> Tensor:
+    """`side` x `side` offsets (a, b) that sweep a cell evenly, [side * side, 2] within (-1/2, 1/2)."""
+    steps = (torch.arange(side, dtype=torch.float64) + 0.5) / side - 0.5
+    return torch.cartesian_prod(steps, steps)
+
+
+def sample_points(level: Level, pattern: Pattern, theta: Tensor, at: Tensor) -> tuple[Tensor, Tensor]:
+    """Where fractional indices [M, 2] lie on the map: ([M, 2] map pixels, [M] in front of the camera)."""
+    return project(level.map_from_plane(pattern, theta), pattern.points_at(at, theta))
+
+
+def read_cells(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, grid: Tensor) -> Cells:
+    """The features of the cells around `index` [N, 2], at the offsets `grid` [K, 2]."""
+    at = (index[:, None, :] + grid[None]).reshape(-1, 2)
+    points, in_front = sample_points(level, pattern, theta, at)
+    points = points.float()
+    known = sample_valid(level.valid, points) & in_front
+    values = sample(level.values, points) * known[:, None]
+    shape = (len(index), len(grid))
+    return Cells(values.reshape(*shape, -1), known.reshape(shape))
+
+
+def agreement(a: Tensor, b: Tensor, known: Tensor) -> Tensor:
+    """2 <a, b> / (|a|^2 + |b|^2) over the known samples: 1 equal, 0 unrelated; [..., K, C] -> [...].
+
+    Unlike a correlation it falls, too, where one of the two is much fainter.
+    """
+    mask = known[..., None]
+    inner = (a * b * mask).sum((-2, -1))
+    energy = ((a * a + b * b) * mask).sum((-2, -1))
+    return 2 * inner / energy.clamp(min=1e-6)
+
+
+def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
+    """The weighted mean of the cells [K, C] and the weight [K] that each sample of it rests on."""
+    weight = cells.known * weights[:, None].to(cells.values)
+    total = weight.sum(0)
+    return torch.einsum("nk,nkc->kc", weight, cells.values) / total.clamp(min=1e-6)[:, None], total
+
+
+def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:
+    """Each cell's agreement with the weighted mean of all the others, [N]."""
+    mean, total = mean_cell(cells, weights)
+    own = cells.known * weights[:, None].to(cells.values)
+    rest = (total[None] - own).clamp(min=1e-6)[..., None]
+    others = (mean[None] * total[None, :, None] - own[..., None] * cells.values) / rest
+    return agreement(cells.values, others, cells.known)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contrast:
+    """How well each cell is predicted by the others, [N] each.
+
+    `agreement`: with the mean of all other cells. `contrast`: the same less the best that the mean reaches
+    half a step away; what a pattern has and a smooth or striped picture has not.
+    """
+
+    agreement: Tensor
+    contrast: Tensor
+
+
+def contrast(
+    level: Level,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    *,
+    weights: Tensor,
+    grid: Tensor,
+    half_steps: Tensor = HALF_STEPS,
+    rounds: int = 2,
+) -> Contrast:
+    """Predict each cell from all others. `weights` [N] start the mean; then the contrast itself weighs."""
+    # All in one reading: what a cell costs is little, what a call costs is not.
+    steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), half_steps, -half_steps])
+    every = read_cells(level, pattern, theta, (index[None] + steps[:, None]).reshape(-1, 2), grid)
+    values = every.values.reshape(len(steps), len(index), *every.values.shape[1:])
+    known = every.known.reshape(len(steps), len(index), -1)
+    return contrast_of(Cells(values, known), weights=weights, rounds=rounds)
+
+
+def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Contrast:
+    """The contrast [N] of cells that were read whole and at half steps.
+
+    Shapes: cells.values [1 + 2 * M, N, K, C] and known [1 + 2 * M, N, K]: the whole cells, then those M half
+    steps ahead, then those behind. `weights` [N] start the mean; then the contrast itself weighs.
+    """
+    values, known = cells.values, cells.known
+    whole = Cells(values[0], known[0])
+    found = Contrast(torch.zeros(values.shape[1]), torch.zeros(values.shape[1]))
+    weights = weights.float()
+    for _ in range(rounds):
+        mean, _ = mean_cell(whole, weights)
+        others = agreement_with_others(whole, weights)
+        at_half = agreement(values[1:], mean, known[1:]).unflatten(0, (2, -1))
+        found = Contrast(others, others - at_half.mean(0).amax(0).clamp(min=0))
+        weights = found.contrast.clamp(min=0)
+        if float(weights.sum()) <= 0:
+            break
+    return found

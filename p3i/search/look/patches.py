@@ -1,0 +1,243 @@
+"""Object patches: the plane around each draw of any program, read off the photo and compared.
+
+Cells (cells.py) are swept by fractional loop indices, which suits lattices. Rings, spirals and single rows
+have no second direction to sweep, and their objects turn as they go round. A patch is a square of plane of
+one size for the whole program, about each draw, turned with the curve where the program draws on a curve. As
+there, a pattern is where objects predict each other and do not predict what lies half a step away.
+
+Convention: N patches of `side` x `side` samples, C channels; `index` float64 [N, 2] loop indices, fractions
+allowed; plane coordinates in program units. Patch offsets (a, b) are in patch sides: a along the curve, b
+across it (a quarter turn clockwise on the screen).
+"""
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from p3i.interp.camera import project
+from p3i.interp.pattern import Pattern
+from p3i.search.look.cells import HALF_STEPS, Cells, Contrast, contrast_of
+from p3i.search.look.correlate import Instances, correlate, mean_of_others
+from p3i.search.look.evidence import ColourMap, Evidence
+from p3i.search.look.thinned import thinned
+from p3i.vision.warp import sample, sample_valid
+
+SIDE = 14
+"""Samples along a patch's side."""
+REACH = 5
+"""Samples to each side by which an object is searched for around its patch: about a third of a side."""
+# Loop indices this far apart give the direction of the curve.
+_TANGENT_STEP = 0.02
+# More draws than this are not needed to say how far apart draws are.
+_MOST_MEASURED, _FEWEST_MEASURED = 400, 20
+# ... each against all others, so many distances at most.
+_MOST_DISTANCES = 2_000_000
+# An object's place is known to this share of a patch's side, and no better than this many pixels.
+_SHARE_NOISE = 0.03
+_PIXEL_NOISE = 0.3
+# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
+_FLOOR = 0.4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frames:
+    """Where patches lie on the plane: `origin` [N, 2], `along` and `across` [N, 2], one patch side long."""
+
+    origin: Tensor
+    along: Tensor
+    across: Tensor
+
+    def points(self, offsets: Tensor) -> Tensor:
+        """The plane points at `offsets` [..., N or 1, K, 2] -> [..., N, K, 2]."""
+        a, b = offsets[..., 0, None], offsets[..., 1, None]
+        return self.origin[:, None] + a * self.along[:, None] + b * self.across[:, None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patches:
+    """Features [N, C, side, side] of patches and which samples are `known` [N, side, side]."""
+
+    values: Tensor
+    known: Tensor
+
+    def cells(self) -> Cells:
+        """The same as rows of samples: values [N, K, C], known [N, K]."""
+        return Cells(self.values.flatten(2).mT, self.known.flatten(1))
+
+
+def spacing(pattern: Pattern, theta: Tensor) -> float:
+    """The median distance of a draw under theta [P] to its nearest, in program units; 1 for a single draw.
+
+    Draws that coincide count once.
+    """
+    centers = pattern.centers(theta)
+    most = max(_FEWEST_MEASURED, min(_MOST_MEASURED, _MOST_DISTANCES // max(len(centers), 1)))
+    distance = torch.cdist(centers[thinned(pattern.index, most)], centers)
+    distance = torch.where(distance > 1e-6, distance, torch.inf).amin(1)
+    finite = distance[torch.isfinite(distance)]
+    return float(finite.median()) if len(finite) else 1.0
+
+
+def frames(pattern: Pattern, theta: Tensor, index: Tensor, *, side: float) -> Frames:
+    """The patches of `side` program units about `index` [N, 2]."""
+    origin = pattern.points_at(index, theta)
+    variable = pattern.turning
+    if variable is None:
+        along = torch.tensor([side, 0.0], dtype=torch.float64).expand_as(origin)
+    else:
+        step = torch.zeros(2, dtype=torch.float64)
+        step[variable] = _TANGENT_STEP
+        tangent = pattern.points_at(index + step, theta) - pattern.points_at(index - step, theta)
+        along = side * tangent / tangent.norm(dim=1, keepdim=True).clamp(min=1e-12)
+    across = torch.stack([-along[:, 1], along[:, 0]], 1)
+    return Frames(origin, along, across)
+
+
+def half_steps(pattern: Pattern) -> Tensor:
+    """The half steps [M, 2] of the loop variables that move the draws: one where only one does."""
+    theta = dict(zip(pattern.paths, pattern.theta.tolist(), strict=True))
+    moving = [
+        any(
+            path.startswith("draw.") and path.endswith(f".{variable}") and value != 0
+            for path, value in theta.items()
+        )
+        for variable in ("i", "j")
+    ]
+    if all(moving):
+        return HALF_STEPS
+    return HALF_STEPS[:1] if moving[0] else HALF_STEPS[1:2]
+
+
+def offsets_grid(count: int, *, samples_a_side: int = SIDE) -> Tensor:
+    """`count` x `count` offsets about the middle of a patch that has `samples_a_side`: [count, count, 2]."""
+    steps = (torch.arange(count, dtype=torch.float64) - (count - 1) / 2) / samples_a_side
+    b, a = torch.meshgrid(steps, steps, indexing="ij")
+    return torch.stack([a, b], -1)
+
+
+def sample_px(matrix: Tensor, where: Frames, *, side: int = SIDE) -> float:
+    """The median distance of patches' samples in photo pixels; `matrix` [3, 3] takes units to these."""
+    lengths = []
+    middle, front = project(matrix, where.origin)
+    for axis in (where.along, where.across):
+        there, ahead = project(matrix, where.origin + 0.25 * axis)
+        lengths.append((there - middle).norm(dim=1)[front & ahead] * 4 / side)
+    typical = torch.cat(lengths)
+    return float(typical.median()) if len(typical) else 1.0
+
+
+def read(
+    colours: ColourMap, matrix: Tensor, where: Frames, *, count: int = SIDE, side: int = SIDE
+) -> Patches:
+    """The features of `count` x `count` samples about each frame, `side` of them to a patch side.
+
+    `matrix` [3, 3] takes program units to photo pixels. Twelve channels: for each of L, a, b the gradient's
+    strength and its double angle (as in vision/oriented.py, but in the frame's own directions, so that
+    objects that turn with a ring stay equal), then L, a, b themselves. Each patch is freed of its mean, and
+    gradients and colours are each scaled to mean energy 1/2 over all patches.
+    """
+    rim = count + 2
+    at, in_front = project(
+        colours.map_from_photo @ matrix,
+        where.points(offsets_grid(rim, samples_a_side=side).reshape(-1, 2)).reshape(-1, 2),
+    )
+    at = at.float()
+    lab = sample(colours.values, at).reshape(-1, rim, rim, 3).permute(0, 3, 1, 2)
+    known = (sample_valid(colours.valid, at) & in_front).reshape(-1, rim, rim)
+    # A gradient is known where the samples about it are.
+    whole = F.max_pool2d((~known).float()[:, None], 3, stride=1)[:, 0] < 0.5
+    return Patches(_features(lab, whole), whole)
+
+
+def _features(lab: Tensor, known: Tensor) -> Tensor:
+    """[N, 3, s + 2, s + 2] colours -> [N, 12, s, s] normalised features, 0 where not known [N, s, s]."""
+    gx = 0.5 * (lab[:, :, 1:-1, 2:] - lab[:, :, 1:-1, :-2])
+    gy = 0.5 * (lab[:, :, 2:, 1:-1] - lab[:, :, :-2, 1:-1])
+    squared = gx.square() + gy.square()
+    root = squared.sqrt().sqrt()
+    factor = root / (squared + _FLOOR**2)
+    gradient = torch.cat([root, (gx.square() - gy.square()) * factor, 2 * gx * gy * factor], 1)
+    return torch.cat([_normalised(gradient, known), _normalised(lab[:, :, 1:-1, 1:-1], known)], 1)
+
+
+def _normalised(values: Tensor, known: Tensor) -> Tensor:
+    """Each patch freed of its mean and divided by sqrt(its energy + the mean energy of all)."""
+    mask = known[:, None].float()
+    count = mask.sum((2, 3), keepdim=True).clamp(min=1)
+    values = (values - (values * mask).sum((2, 3), keepdim=True) / count) * mask
+    energy = values.square().sum((1, 2, 3), keepdim=True) / count
+    typical = energy[energy > 0].median() if bool((energy > 0).any()) else energy.sum() + 1.0
+    return values / (energy + typical).clamp(min=1e-9).sqrt()
+
+
+def patch_contrast(
+    evidence: Evidence,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    *,
+    side: float,
+    focal_mm: Tensor | float,
+    rounds: int = 3,
+) -> Contrast:
+    """How well each patch at `index` [N, 2] is predicted by the others, beyond half a step away: [N] each."""
+    steps = half_steps(pattern)
+    every = torch.cat([torch.zeros(1, 2, dtype=torch.float64), steps, -steps])
+    where = frames(pattern, theta, (index[None] + every[:, None]).reshape(-1, 2), side=side)
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where).cells()
+    values = cells.values.reshape(len(every), len(index), *cells.values.shape[1:])
+    known = cells.known.reshape(len(every), len(index), -1)
+    return contrast_of(Cells(values, known), weights=torch.ones(len(index)), rounds=rounds)
+
+
+def find_objects(
+    evidence: Evidence,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    weights: Tensor,
+    *,
+    side: float,
+    focal_mm: Tensor | float,
+    reach: int = REACH,
+) -> Instances:
+    """Search around each patch of `index` [N, 2] for the mean patch; `weights` [N] make that mean.
+
+    The offsets that come back are in patch sides, along and across.
+    """
+    where = frames(pattern, theta, index, side=side)
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    colours = evidence.colours_for(sample_px(matrix, where))
+    patches = read(colours, matrix, where, count=SIDE + 2 * reach)
+    known = patches.known.float()[:, None]
+    middle = slice(reach, reach + SIDE)
+    own, own_known = patches.values[:, :, middle, middle], known[:, :, middle, middle]
+    templates = mean_of_others(own, own_known, weights)
+    offsets, peak, lead = correlate(patches.values, known, templates)
+    # Rows of a patch run across the curve, columns along it.
+    return Instances(index, offsets.flip(1) / SIDE, peak, lead)
+
+
+def whitening(matrix: Tensor, where: Frames) -> Tensor:
+    """[N, 2, 2]: differences in pixels to differences in units of places' noise, along and across."""
+    columns = []
+    for axis in (where.along, where.across):
+        ahead, _ = project(matrix, where.origin + 0.1 * axis)
+        behind, _ = project(matrix, where.origin - 0.1 * axis)
+        columns.append((ahead - behind) / 0.2)
+    px_from_side = torch.stack(columns, 2)
+    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
+    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
+    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
+
+
+def misfit(difference: Tensor, *, whiten: Tensor, certainty: Tensor) -> float:
+    """How far objects lie from their places: a robust mean, 0 where all are there.
+
+    Shapes: difference [N, 2] in pixels; whiten [N, 2, 2], of `whitening`; certainty [N], not all 0.
+    """
+    residual = torch.einsum("nij,nj->ni", whiten, difference)
+    return float((certainty * (1 + residual.square().sum(1) / 4).log()).sum() / certainty.sum())

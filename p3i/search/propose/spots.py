@@ -1,0 +1,221 @@
+"""Rings of separate objects: ellipses through spots that look alike, and the two circles that each may be.
+
+Where nothing but the objects themselves lies on a ring, rotations of the whole picture say little (votes.py).
+But five spots fix an ellipse, and an ellipse of known focal is one of two circles in space.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.interp.camera import Camera
+from p3i.search.look.evidence import Evidence
+
+Array = NDArray[np.float64]
+
+# The map on which spots are looked for: its longer side, about; spots of these widths, in its pixels.
+_LONGER = 400
+_WIDTHS = (2.0, 3.0, 4.5, 6.7, 10.0, 15.0)
+_MOST_SPOTS = 70
+# Alike are spots whose colours differ from their ground in the same direction, by this factor at most, and
+# whose widths differ by that factor at most.
+_LEAST_COSINE = 0.85
+_MOST_STRONGER = 2.5
+_MOST_WIDER = 2.3
+# Each spot is tried with this many of the spots like it, in so many draws of five.
+_FELLOWS = 16
+_DRAWS = 150
+# A spot lies on an ellipse where it is this close, as a share of the ellipse's size, and in pixels.
+_CLOSE = 0.03
+_CLOSE_PX = 1.5
+_FEWEST = 5
+# An ellipse is no longer than this beside its width, and its radius lies between these shares of the map.
+_MOST_OBLONG = 4.0
+_RADII = (0.05, 0.6)
+_MOST_ELLIPSES = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CircleSeed:
+    """A circle that spots may lie on: its pose (degrees), and its centre in photo pixels."""
+
+    rx_deg: float
+    ry_deg: float
+    center_px: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Spots:
+    """Spots of a map: places [N, 2], widths [N], and how their colour differs from the ground [N, 3]."""
+
+    at: Array
+    width: Array
+    colour: Array
+
+
+def circle_seeds(evidence: Evidence, generator: np.random.Generator) -> list[CircleSeed]:
+    """The circles through spots that look alike, the most telling first: two for each ellipse."""
+    colours = evidence.colours_for(evidence.image.size.longer / _LONGER)
+    lab = colours.lab
+    spots = _spots(lab, colours.valid.numpy())
+    if len(spots.at) < _FEWEST:
+        return []
+    photo_from_map = np.linalg.inv(colours.map_from_photo.numpy())
+    size = evidence.image.size
+    focal_px = Camera(focal_mm=evidence.focal_mm).focal_px(size)
+    lens = np.array([[focal_px, 0, size.middle[0]], [0, focal_px, size.middle[1]], [0, 0, 1.0]])
+    found: list[CircleSeed] = []
+    for conic in _ellipses(spots, max(lab.shape[:2]), generator):
+        to_map = np.linalg.inv(photo_from_map)
+        on_photo = to_map.T @ conic @ to_map
+        found += [
+            CircleSeed(camera.rx_deg, camera.ry_deg, center)
+            for camera, center in _circles(on_photo, lens, evidence.focal_mm)
+        ]
+    return found
+
+
+def _spots(lab: NDArray, known: NDArray[np.bool_]) -> _Spots:
+    """The strongest spots: places where a blur differs most from a wider one, over place and width."""
+    levels, differences = [], []
+    for width in _WIDTHS:
+        inner = cv2.GaussianBlur(lab, (0, 0), width * 0.7)
+        difference = inner - cv2.GaussianBlur(lab, (0, 0), width * 1.3)
+        differences.append(difference)
+        levels.append(np.sqrt((difference**2).sum(2)) * known)
+    stack = np.stack(levels)
+    widest = np.stack([cv2.dilate(level, np.ones((5, 5))) for level in stack])
+    around = np.maximum(widest, np.maximum(np.roll(widest, 1, 0), np.roll(widest, -1, 0)))
+    peaks = np.argwhere((stack >= around) & (stack > 0))
+    height, width_px = known.shape
+    strength = stack[tuple(peaks.T)]
+    kept: list[NDArray] = []
+    for place in np.argsort(-strength):
+        level, y, x = peaks[place]
+        rim = 1.0 * _WIDTHS[level]
+        if not (rim <= x < width_px - rim and rim <= y < height - rim):
+            continue
+        if all(np.hypot(y - other[1], x - other[2]) > _WIDTHS[level] for other in kept):
+            kept.append(peaks[place])
+        if len(kept) >= _MOST_SPOTS:
+            break
+    if not kept:
+        return _Spots(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)))
+    level, y, x = np.array(kept).T
+    colour = np.stack([differences[k][row, column] for k, row, column in zip(level, y, x, strict=True)])
+    return _Spots(np.stack([x, y], 1).astype(float), np.array(_WIDTHS)[level], colour.astype(float))
+
+
+def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> list[Array]:
+    """Ellipses through many spots that are alike, as conics [3, 3] of the map, the most telling first."""
+    strength = np.linalg.norm(spots.colour, axis=1)
+    cosine = (spots.colour @ spots.colour.T) / np.maximum(strength[:, None] * strength, 1e-9)
+    stronger = np.maximum(strength[:, None] / strength, strength / strength[:, None])
+    wider = np.maximum(spots.width[:, None] / spots.width, spots.width / spots.width[:, None])
+    alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_WIDER)
+    # Strong spots tell more than weak ones, and many on one ellipse say little where there are many anyway.
+    telling = np.sqrt(strength / max(float(strength.max()), 1e-9)) / np.sqrt(np.maximum(alike.sum(1), 1))
+    best: list[tuple[float, Array, NDArray]] = []
+    for spot in range(len(spots.at)):
+        fellows = np.flatnonzero(alike[spot])
+        if len(fellows) < _FEWEST:
+            continue
+        nearest = fellows[np.argsort(-cosine[spot, fellows])][:_FELLOWS]
+        nearest = nearest[nearest != spot]
+        if len(nearest) < _FEWEST - 1:
+            continue
+        draws = np.argsort(generator.random((_DRAWS, len(nearest))), 1)[:, : _FEWEST - 1]
+        five = np.concatenate([np.full((_DRAWS, 1), spot), nearest[draws]], 1)
+        conics = _conics(spots.at[five], longer)
+        on, misfit = _members(conics, spots.at[fellows], longer)
+        counts = on.sum(1)
+        worth = (counts - misfit) * telling[spot]
+        k = int(np.argmax(worth))
+        if counts[k] >= _FEWEST:
+            best.append((float(worth[k]), conics[k], fellows[on[k]]))
+    best.sort(key=lambda one: -one[0])
+    found: list[Array] = []
+    taken: list[set[int]] = []
+    for _, conic, members in best:
+        names = set(members.tolist())
+        if any(len(names & other) > 0.6 * len(names) for other in taken):
+            continue
+        taken.append(names)
+        found.append(conic)
+        if len(found) >= _MOST_ELLIPSES:
+            break
+    return found
+
+
+def _conics(points: Array, longer: int) -> Array:
+    """The conics [D, 3, 3] through five points each [D, 5, 2]."""
+    scale = longer / 2
+    x, y = (points / scale - 1)[..., 0], (points / scale - 1)[..., 1]
+    rows = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], -1)
+    _, _, vectors = np.linalg.svd(rows)
+    a, b, c, d, e, f = vectors[:, -1].T
+    normed = np.stack(
+        [np.stack([a, b / 2, d / 2], -1), np.stack([b / 2, c, e / 2], -1), np.stack([d / 2, e / 2, f], -1)],
+        -2,
+    )
+    change = np.array([[1 / scale, 0, -1], [0, 1 / scale, -1], [0, 0, 1.0]])
+    return change.T @ normed @ change
+
+
+def _members(conics: Array, points: Array, longer: int) -> tuple[NDArray[np.bool_], Array]:
+    """Which points [N, 2] lie on each conic [D, N], and a misfit in 0..1; none on what is no fair ellipse."""
+    block = conics[:, :2, :2]
+    determinant = np.linalg.det(block)
+    safe = np.where(np.abs(determinant) > 1e-15, determinant, 1.0)
+    inverse = (
+        np.stack(
+            [
+                np.stack([block[:, 1, 1], -block[:, 0, 1]], -1),
+                np.stack([-block[:, 1, 0], block[:, 0, 0]], -1),
+            ],
+            -2,
+        )
+        / safe[:, None, None]
+    )
+    center = -np.einsum("dij,dj->di", inverse, conics[:, :2, 2])
+    level = np.einsum("di,di->d", conics[:, 2, :2], center) + conics[:, 2, 2]
+    shape = -block / np.where(np.abs(level) > 1e-15, level, 1.0)[:, None, None]  # (p - c)' shape (p - c) = 1
+    values = np.linalg.eigvalsh(shape)
+    fair = (determinant > 0) & (values[:, 0] > 0)
+    axes = 1 / np.sqrt(np.where(values > 0, values, 1.0))
+    fair &= axes[:, 0] < _MOST_OBLONG * axes[:, 1]
+    radius = np.sqrt(axes[:, 0] * axes[:, 1])
+    fair &= (radius > _RADII[0] * longer) & (radius < _RADII[1] * longer)
+    away = points[None] - center[:, None]
+    distance = np.sqrt(np.maximum(np.einsum("dni,dij,dnj->dn", away, shape, away), 0)) - 1
+    limit = _CLOSE + _CLOSE_PX / np.maximum(radius, 1.0)
+    off = np.abs(distance) / limit[:, None]
+    on = (off < 1) & fair[:, None]
+    return on, (np.where(on, off, 0).sum(1) / np.maximum(on.sum(1), 1))
+
+
+def _circles(conic: Array, lens: Array, focal_mm: float) -> list[tuple[Camera, Array]]:
+    """The two cameras that see a circle as this conic of the photo, with the circle's centre in pixels.
+
+    The cone over the conic, turned to its axes, is cut in circles by two families of planes (a classical
+    result; Forsyth et al., Invariant descriptors for 3-D object recognition and pose, PAMI 1991).
+    """
+    cone = lens.T @ conic @ lens
+    cone = cone / np.cbrt(np.abs(np.linalg.det(cone)) + 1e-30)
+    values, vectors = np.linalg.eigh(cone)
+    if (values > 0).sum() == 1:
+        values, vectors = -values[::-1], vectors[:, ::-1]
+    if (values > 0).sum() != 2:
+        return []
+    low, middle, high = values  # low < 0 < middle <= high
+    across, along = np.sqrt(max(high - middle, 0.0)), np.sqrt(middle - low)
+    found = []
+    for sign in (1.0, -1.0):
+        normal = sign * across * vectors[:, 2] + along * vectors[:, 0]
+        camera = Camera.from_normal((normal[0], normal[1], normal[2]), focal_mm=focal_mm)
+        horizon = np.linalg.inv(lens).T @ np.array(camera.normal)
+        center = np.linalg.inv(conic) @ horizon
+        found.append((camera, center[:2] / center[2]))
+    return found

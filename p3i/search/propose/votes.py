@@ -1,0 +1,294 @@
+"""Where rings may be: centres by votes of rotations, then radius and count by unrolling about them.
+
+A ring looks the same when it is turned about its centre. For each pose of a grid the picture is
+straightened and correlated with itself turned by some angles: a peak at the shift s speaks for the centre c
+with s = (I - R) c. Rims, dials and wheels speak at every angle, a ring of n objects at about 360/n and its
+multiples, all at one centre, and that point of the photo moves little with the pose. About each centre the
+photo is unrolled, angle against the logarithm of the radius (look/unrolled.py), where a ring is a row.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.interp.camera import image_from_plane
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.unrolled import Rows, best_rows, double_angle, likeness, unroll
+from p3i.search.propose.poses import pose_grid
+from p3i.search.propose.spots import circle_seeds
+from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
+from p3i.size import Size
+
+Floats = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+# The canvas of a straightened view, in pixels a side, and of its padded transform.
+_CANVAS = 96
+_PADDED = 192
+_POSE_STEP_DEG = 15.0
+_MOST_TILT_DEG = 62.0
+# A view reaches to where things are this many times as far away as the nearest.
+_DEPTH_RANGE = 3.5
+# Turns that between them come close to a multiple of 360/n for every n from 5 on.
+_TURNS_DEG = (36.0, 45.0, 51.4, 60.0, 72.0)
+# So many of the turns must agree: a ring of few objects answers to few.
+_AGREEING = 2
+# Peaks of the votes are this far apart, in canvas pixels, and at most so many are kept of each pose.
+_APART = 9
+_MOST_OF_POSE = 8
+# An overlap of less than this share of the view's energy proves little.
+_LEAST_OVERLAP = 0.4
+# Centres closer than this share of the longer side are one.
+_SAME_CENTRE = 0.03
+_MOST_CENTRES = 16
+_POSES_A_CENTRE = 3
+# From so many centres the search climbs to the best pose and centre near by.
+_MOST_CLIMBED = 5
+# A circle of spots is worth as much as a centre with so many votes.
+_SPOTS_WORTH = 0.15
+# The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
+_STEP_DEG = 6.0
+_STEP_SHARE = 0.08
+_CLIMBS = 6
+# Proposals are one where centre and radius differ by less than this share of the radius, and poses by less.
+_SAME_SHARE = 0.04
+_SAME_POSE_DEG = 3.0
+# Proposals worth less than this share of the best are not told.
+_LEAST_SHARE = 0.03
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Vote:
+    """A centre that rotations speak for: photo pixels, and the pose under which they do."""
+
+    worth: float
+    rx_deg: float
+    ry_deg: float
+    center_px: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RingProposal:
+    """A ring worth refining: pose (degrees), centre and radius (program units), count, and its promise."""
+
+    rx_deg: float
+    ry_deg: float
+    focal_mm: float
+    center: Array
+    radius: float
+    count: int
+    worth: float
+
+
+def rotation_votes(evidence: Evidence) -> list[Vote]:
+    """The centres that rotations speak for, at most a few for each pose, the most votes first."""
+    colours = evidence.colours_for(evidence.image.size.longer / (2.5 * _CANVAS))
+    known = colours.valid.numpy().astype(np.float32)
+    size, map_from_photo = evidence.image.size, colours.map_from_photo.numpy()
+    found: list[Vote] = []
+    for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, _MOST_TILT_DEG):
+        seen = image_from_plane(rx_deg, ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
+        view = _view(colours.lab, known, map_from_photo @ seen)
+        if view is None:
+            continue
+        tensor, weights, map_from_view = view
+        votes = _votes(tensor, weights)
+        peaks = votes == cv2.dilate(votes, np.ones((_APART, _APART)))
+        rows, columns = np.nonzero(peaks & (votes > 0))
+        for place in np.argsort(-votes[rows, columns])[:_MOST_OF_POSE]:
+            at = np.linalg.inv(map_from_photo) @ map_from_view @ [columns[place], rows[place], 1.0]
+            center = at[:2] / at[2]
+            if (np.abs(center - size.middle) < 0.53 * np.array([size.width, size.height])).all():
+                found.append(Vote(float(votes[rows[place], columns[place]]), rx_deg, ry_deg, center))
+    return sorted(found, key=lambda vote: -vote.worth)
+
+
+def ring_proposals(evidence: Evidence, *, seed: int = 0) -> list[RingProposal]:
+    """Rings about the centres with the most votes and on circles of spots, the most promising first.
+
+    `seed` is that of the draws of spots.
+    """
+    centres: list[tuple[Vote, list[Rows]]] = []
+    for votes in _by_centre(rotation_votes(evidence), evidence.image.size.longer):
+        centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
+    for circle in circle_seeds(evidence, np.random.default_rng(seed)):
+        vote = Vote(_SPOTS_WORTH, circle.rx_deg, circle.ry_deg, circle.center_px)
+        centres.append((vote, _rows_about(evidence, vote)))
+    centres.sort(key=_promise, reverse=True)
+    found: list[RingProposal] = []
+    for vote, rows in centres[:_MOST_CLIMBED]:
+        if not rows:
+            continue
+        vote = _climbed(evidence, vote, rows[0])
+        center = _on_plane(evidence, vote)
+        for row in _rows_about(evidence, vote):
+            pose = vote.rx_deg, vote.ry_deg
+            worth = row.worth * math.sqrt(vote.worth)
+            found.append(RingProposal(*pose, evidence.focal_mm, center, row.radius, row.count, worth))
+    return _distinct(sorted(found, key=lambda proposal: -proposal.worth))
+
+
+def _distinct(proposals: list[RingProposal]) -> list[RingProposal]:
+    """Without those that a better one says already, as climbs from several centres often end at the same, and
+    without the hopeless."""
+    kept: list[RingProposal] = []
+    for one in proposals:
+        if one.worth > _LEAST_SHARE * proposals[0].worth and not any(_same(one, other) for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _same(one: RingProposal, other: RingProposal) -> bool:
+    """Whether two proposals are so close that their fits end at the same ring."""
+    near = _SAME_SHARE * other.radius
+    return (
+        one.count == other.count
+        and float(np.hypot(*(one.center - other.center))) < near
+        and abs(one.radius - other.radius) < near
+        and math.hypot(one.rx_deg - other.rx_deg, one.ry_deg - other.ry_deg) < _SAME_POSE_DEG
+    )
+
+
+def _promise(centre: tuple[Vote, list[Rows]]) -> float:
+    vote, rows = centre
+    return rows[0].worth * math.sqrt(vote.worth) if rows else 0.0
+
+
+def _climbed(evidence: Evidence, vote: Vote, row: Rows) -> Vote:
+    """The pose and centre near the vote's under which the ring agrees best: one number after the other."""
+    numbers = np.array([vote.rx_deg, vote.ry_deg, *vote.center_px])
+    radius_px = row.radius * evidence.image.size.unit_px
+    steps = np.array([_STEP_DEG, _STEP_DEG, _STEP_SHARE * radius_px, _STEP_SHARE * radius_px])
+
+    def at(numbers: Array) -> Vote:
+        return Vote(vote.worth, float(numbers[0]), float(numbers[1]), numbers[2:])
+
+    def worth(numbers: Array) -> float:
+        moved = at(numbers)
+        pose, center = (moved.rx_deg, moved.ry_deg), _on_plane(evidence, moved)
+        strip = unroll(evidence, pose, center, focal_mm=evidence.focal_mm, about=row.radius)
+        return 0.0 if strip is None else likeness(strip, row.count)
+
+    best = worth(numbers)
+    for _ in range(_CLIMBS):
+        for place in range(len(numbers)):
+            for sign in (1.0, -1.0):
+                moved = numbers.copy()
+                moved[place] += sign * steps[place]
+                value = worth(moved)
+                if value > best:
+                    numbers, best = moved, value
+                    break
+            else:
+                steps[place] *= 0.5
+    return at(numbers)
+
+
+def _rows_about(evidence: Evidence, vote: Vote) -> list[Rows]:
+    center = _on_plane(evidence, vote)
+    strip = unroll(evidence, (vote.rx_deg, vote.ry_deg), center, focal_mm=evidence.focal_mm)
+    return [] if strip is None else best_rows(strip)
+
+
+def _on_plane(evidence: Evidence, vote: Vote) -> Array:
+    """The vote's centre in program units under its pose."""
+    matrix = image_from_plane(
+        vote.rx_deg, vote.ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm
+    ).numpy()
+    at = np.linalg.inv(matrix) @ [*vote.center_px, 1.0]
+    return at[:2] / at[2]
+
+
+def _by_centre(votes: list[Vote], longer: int) -> list[list[Vote]]:
+    """The votes for each of the best centres, each under its best few poses."""
+    groups: list[list[Vote]] = []
+    for vote in votes:
+        for group in groups:
+            if np.hypot(*(group[0].center_px - vote.center_px)) < _SAME_CENTRE * longer:
+                if len(group) < _POSES_A_CENTRE:
+                    group.append(vote)
+                break
+        else:
+            if len(groups) < _MOST_CENTRES:
+                groups.append([vote])
+    return groups
+
+
+def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, Floats, Array] | None:
+    """The picture straightened: the gradient's double angle as complex numbers, weights, view -> map."""
+    height, width = known.shape
+    canvas = view_canvas(map_from_plane, Size(width, height), side=_CANVAS, depth_range=_DEPTH_RANGE)
+    if canvas is None:
+        return None
+    map_from_view = map_from_plane @ canvas.plane_from_view
+    depth = depth_of_view(map_from_view, _CANVAS)
+
+    def warped(planes: Floats) -> Floats:
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return cv2.warpPerspective(planes, map_from_view, (_CANVAS, _CANVAS), flags=flags)  # pyright: ignore
+
+    seen = cv2.erode(((depth > 0) & (warped(known) > 0.99)).astype(np.uint8), np.ones((5, 5)))
+    seen[:2] = seen[-2:] = 0
+    seen[:, :2] = seen[:, -2:] = 0
+    if not seen.any():
+        return None
+    tensor = gradient_tensor(np.asarray(cv2.GaussianBlur(warped(lab), (0, 0), 0.8), np.float32)) * seen
+    energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.08 * _CANVAS)
+    tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
+    return tensor, even_weights(seen, depth), map_from_view
+
+
+def gradient_tensor(lab: Floats) -> NDArray[np.complex64]:
+    """The gradient of a picture [H, W, 3] as complex numbers: sqrt(|grad|) times e^(2i direction)."""
+    gx = 0.5 * (np.roll(lab, -1, 1) - np.roll(lab, 1, 1))
+    gy = 0.5 * (np.roll(lab, -1, 0) - np.roll(lab, 1, 0))
+    _, cosine, sine = double_angle(gx, gy)
+    return (cosine + 1j * sine).astype(np.complex64)
+
+
+def _votes(tensor: NDArray, weights: Floats) -> Floats:
+    """How much rotations speak for each pixel of the view as a centre: [_CANVAS, _CANVAS]."""
+    middle = (_CANVAS - 1) / 2
+    energy = np.abs(tensor) ** 2
+    turned_by: list[Floats] = []
+    first = _transform(tensor * weights)
+    rest = _transform(weights * energy - 1j * weights)
+    rows, columns = np.mgrid[0:_CANVAS, 0:_CANVAS] - middle
+    for turn_deg in _TURNS_DEG:
+        turn = math.radians(turn_deg)
+        rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        about_middle = np.hstack([rotation, (middle - rotation @ [middle, middle])[:, None]])
+
+        def turned(plane: NDArray, matrix: Array = about_middle) -> NDArray:
+            return cv2.warpAffine(np.ascontiguousarray(plane, np.float32), matrix, (_CANVAS, _CANVAS))
+
+        weight = turned(weights)
+        other = (turned(np.real(tensor)) + 1j * turned(np.imag(tensor))) * np.exp(2j * turn)
+        alike = _correlation(first, _transform(other * weight))[..., 0]
+        # The imaginary part is sum w E w' + w E' w': the energy of both where they overlap.
+        both = _correlation(rest, _transform(weight * np.abs(other) ** 2 + 1j * weight))[..., 1]
+        ncc = 2 * alike / np.maximum(both, _LEAST_OVERLAP * both.max())
+        # What is turned about c lies shifted by (I - R) c from what is turned about the middle.
+        shift_x = -((1 - rotation[0, 0]) * columns - rotation[0, 1] * rows)
+        shift_y = -(-rotation[1, 0] * columns + (1 - rotation[1, 1]) * rows)
+        at = [(shift + _PADDED / 2).astype(np.float32) for shift in (shift_x, shift_y)]
+        centred = np.fft.fftshift(ncc).astype(np.float32)
+        turned_by.append(np.asarray(cv2.remap(centred, at[0], at[1], cv2.INTER_LINEAR), np.float32))
+    votes = np.sort(np.stack(turned_by), 0)[-_AGREEING:].mean(0)
+    votes = votes - cv2.GaussianBlur(votes, (0, 0), 0.06 * _CANVAS)
+    return cv2.GaussianBlur(votes, (0, 0), 1.0)  # pyright: ignore[reportReturnType]
+
+
+def _transform(plane: NDArray) -> Floats:
+    padded = np.zeros((_PADDED, _PADDED, 2), np.float32)
+    padded[:_CANVAS, :_CANVAS, 0], padded[:_CANVAS, :_CANVAS, 1] = np.real(plane), np.imag(plane)
+    return cv2.dft(padded, flags=cv2.DFT_COMPLEX_OUTPUT, nonzeroRows=_CANVAS)  # pyright: ignore
+
+
+def _correlation(first: Floats, second: Floats) -> Floats:
+    """sum over x of conj(a(x)) b(x + s), [_PADDED, _PADDED, 2] by the shift s, from the transforms."""
+    product = cv2.mulSpectrums(second, first, 0, conjB=True)
+    return cv2.idft(product, flags=cv2.DFT_SCALE | cv2.DFT_COMPLEX_OUTPUT)  # pyright: ignore

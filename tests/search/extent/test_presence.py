@@ -1,0 +1,145 @@
+"""Which cells of a known lattice hold an object, on drawn photos where that is known."""
+
+import cv2
+import numpy as np
+import pytest
+
+from p3i.search.extent.presence import find_extent
+
+RECTANGLE = [(i, j) for i in range(6) for j in range(8)]
+TRIANGLE = [(i, j) for i in range(6) for j in range(6) if i + j >= 5]
+TIN = [(i, j) for i in range(4) for j in range(3)]
+
+
+def extent_of(scene, **changes):
+    given = {
+        "pixels": scene.pixels,
+        "valid": scene.valid,
+        "image_from_plane": scene.image_from_plane,
+        "basis": scene.basis,
+        "origin": scene.origin,
+        **changes,
+    }
+    return find_extent(**given)
+
+
+def cells_of(extent, scene, origin=None):
+    """The cells that an outline draws and whose middle the photo shows."""
+    i, j = np.meshgrid(np.arange(*extent.i_range), np.arange(*extent.j_range))
+    drawn = np.stack([i.ravel(), j.ravel()], 1)
+    drawn = drawn[[all(a * i + b * j >= c for a, b, c in extent.guards) for i, j in drawn]]
+    at = (scene.origin if origin is None else origin) + drawn @ scene.basis
+    x, y, z = scene.image_from_plane @ np.c_[at, np.ones(len(at))].T
+    height, width = scene.valid.shape
+    shown = (z > 0) & (x >= 0) & (x <= (width - 1) * z) & (y >= 0) & (y <= (height - 1) * z)
+    return {(int(a), int(b)) for a, b in drawn[shown]}
+
+
+def shifted(cells, i, j):
+    return {(a + i, b + j) for a, b in cells}
+
+
+@pytest.mark.parametrize("kind", ["disc", "light_disc", "square", "letter"])
+def test_a_board_of_objects_in_clutter_is_found_whole(draw_scene, kind):
+    extent = extent_of(draw_scene(RECTANGLE, kind=kind))
+    assert (extent.i_range, extent.j_range, extent.guards) == ((0, 6), (0, 8), ())
+
+
+def test_a_triangle_is_one_guard(draw_scene):
+    scene = draw_scene(TRIANGLE, basis=((140.0, 0.0), (20.0, 140.0)), radius=40)
+    extent = extent_of(scene)
+    assert cells_of(extent, scene) == set(TRIANGLE)
+    assert extent.guards == ((1, 1, 5),)
+
+
+def test_a_tin_of_twelve_is_found_whole(draw_scene):
+    scene = draw_scene(TIN, basis=((230.0, 0.0), (0.0, 240.0)), origin=(250.0, 330.0), radius=85)
+    assert cells_of(extent_of(scene), scene) == set(TIN)
+
+
+def test_another_origin_of_the_same_lattice_only_renumbers(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    origin = scene.origin + 3 * scene.basis[0] - 2 * scene.basis[1]
+    moved = extent_of(scene, origin=origin)
+    assert cells_of(moved, scene, origin) == shifted(RECTANGLE, -3, 2)
+    assert (moved.i_range, moved.j_range) == ((-3, 3), (2, 10))
+
+
+def test_objects_hidden_by_something_else_stay_inside(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    pixels = scene.pixels.copy()
+    pixels[200:290, 250:330] = (0.1, 0.5, 0.2)
+    assert cells_of(extent_of(scene, pixels=pixels), scene) == set(RECTANGLE)
+
+
+def test_a_third_of_the_objects_may_be_missing(draw_scene):
+    rng = np.random.default_rng(3)
+    cells = [(i, j) for i in range(8) for j in range(8)]
+    present = [cell for cell in cells if rng.uniform() > 0.33]
+    scene = draw_scene(present)
+    assert cells_of(extent_of(scene), scene) == set(cells)
+
+
+def test_stones_count_as_objects_of_a_board_of_lines(draw_scene):
+    cells = [(i, j) for i in range(8) for j in range(8)]
+    stones = [(i, j) for i in range(2, 6) for j in range(1, 6)]
+    scene = draw_scene(cells, kind="crossing")
+    pixels = scene.pixels.copy()
+    for number, (i, j) in enumerate(stones):
+        x, y, z = scene.image_from_plane @ [*(scene.origin + i * scene.basis[0] + j * scene.basis[1]), 1]
+        shade = 0.05 if number % 2 else 0.95
+        cv2.circle(pixels, (round(x / z), round(y / z)), 15, (shade, shade, shade), -1, cv2.LINE_AA)
+    assert cells_of(extent_of(scene, pixels=pixels), scene) == set(cells)
+
+
+def test_what_a_mask_hides_is_no_evidence(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    pixels, valid = scene.pixels.copy(), scene.valid.copy()
+    valid[180:320, 220:400] = False
+    pixels[~valid] = np.random.default_rng(1).uniform(size=(int((~valid).sum()), 3))
+    assert cells_of(extent_of(scene, pixels=pixels, valid=valid), scene) == set(RECTANGLE)
+
+
+def test_a_pattern_that_leaves_the_photo_is_drawn_up_to_its_border(draw_scene):
+    cells = [(i, j) for i in range(-2, 11) for j in range(-2, 11)]
+    corners = ((-300, -200), (900, -260), (1000, 760), (-380, 700))
+    scene = draw_scene(cells, corners=corners)
+    extent = extent_of(scene)
+    at = np.array([scene.origin + np.array(c) @ scene.basis for c in cells])
+    mapped = np.c_[at, np.ones(len(at))] @ scene.image_from_plane.T
+    x, y = (mapped[:, :2] / mapped[:, 2:]).T
+    shown = (x >= 0) & (x <= 639) & (y >= 0) & (y <= 479)
+    assert cells_of(extent, scene) == {cell for cell, inside in zip(cells, shown, strict=True) if inside}
+
+
+def test_a_slightly_wrong_basis_still_finds_the_objects(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    assert cells_of(extent_of(scene, basis=scene.basis * 1.005), scene) == set(RECTANGLE)
+
+
+def test_large_photos_give_the_same_cells(draw_scene):
+    corners = tuple((2 * x, 2 * y) for x, y in ((90, 60), (560, 20), (620, 470), (20, 430)))
+    scene = draw_scene(RECTANGLE, size=(1280, 960), corners=corners)
+    assert cells_of(extent_of(scene), scene) == set(RECTANGLE)
+
+
+def test_a_support_may_be_smaller_than_the_pattern(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    support = np.zeros(scene.valid.shape, np.float32)
+    support[150:330, 180:420] = 1
+    assert cells_of(extent_of(scene, support=support), scene) == set(RECTANGLE)
+
+
+def test_the_answer_is_the_same_every_time(draw_scene):
+    scene = draw_scene(TRIANGLE)
+    assert extent_of(scene) == extent_of(scene)
+
+
+def test_a_plain_photo_holds_nothing(draw_scene):
+    scene = draw_scene([])
+    assert extent_of(scene, pixels=np.full_like(scene.pixels, 0.5)) is None
+
+
+def test_a_photo_without_a_known_pixel_holds_nothing(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    assert extent_of(scene, valid=np.zeros_like(scene.valid)) is None

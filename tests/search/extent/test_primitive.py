@@ -1,0 +1,111 @@
+"""The primitive cell: a multiple comes back to the true cell, a part of a chequered floor to the whole."""
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from truth import PATTERN, evidence_of, index_in, lattice_error, lattice_of, small_scene, true_theta
+
+from p3i.interp.camera import image_from_plane
+from p3i.search.config import SearchConfig
+from p3i.search.extent.primitive import _Ground, _likeness, primitive
+from p3i.search.fit.grow import Fit, measure, side_of_cell
+from p3i.search.forms.lattice import Lattice
+from p3i.search.look.evidence import Evidence
+from p3i.size import Size
+from p3i.vision.image import Image
+
+
+def fit_of(evidence: Evidence, lattice: Lattice) -> Fit:
+    """A fit whose ground is given, not measured: all cells in view."""
+    theta = lattice.theta(PATTERN)
+    fit = measure(evidence.level_for(side_of_cell(evidence, PATTERN, theta)), PATTERN, theta)
+    assert fit is not None
+    return Fit(theta, fit.index, torch.ones(len(fit.index)), fit.score)
+
+
+@pytest.mark.parametrize("factors", [[[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]], [[2, 0], [0, 2]]])
+def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]]) -> None:
+    scene = small_scene(16)
+    truth = Lattice.of(PATTERN, true_theta(scene))
+    multiple = truth.with_basis(np.array(factors) @ truth.basis)
+    ground = fit_of(evidence_of(scene), multiple)
+    own = index_in(scene).numpy()
+    steps = ground.index.numpy() @ factors
+    inside = torch.from_numpy(((steps > own.min(0)) & (steps < own.max(0))).all(1))
+    ground = Fit(ground.theta, ground.index[inside], ground.contrast[inside], ground.score)
+    found = primitive(evidence_of(scene), PATTERN, ground)
+    assert found is not None
+    theta, index = found
+    assert lattice_error(Lattice.of(PATTERN, theta).basis, truth.basis) < 1e-6
+    # The new cells lie on the ground of the old ones, all of it.
+    determinant = abs(np.linalg.det(factors))
+    assert len(index) == round(determinant * len(ground.index))
+    assert len({tuple(cell) for cell in index.tolist()}) == len(index)
+
+
+@pytest.mark.parametrize("seed", [1, 14, 18])
+def test_the_true_cell_is_its_own(seed: int) -> None:
+    scene = small_scene(seed)
+    evidence = evidence_of(scene)
+    lattice = lattice_of(scene.program).moved_to(np.round(np.median(scene.index, axis=0)))
+    theta = lattice.reduced().theta(PATTERN)
+    fit = measure(evidence.level_for(side_of_cell(evidence, PATTERN, theta)), PATTERN, theta)
+    assert fit is not None and int(fit.support.sum()) > 10
+    assert primitive(evidence, PATTERN, fit) is None
+
+
+SIDE = 6.0
+"""A square of the chequered floor, in program units."""
+
+
+def chequered_floor() -> tuple[Evidence, Lattice]:
+    """A floor of light and dark squares under a tilted camera, and the lattice of its single squares."""
+    size = Size(448, 336)
+    lattice = Lattice(-35.0, 10.0, np.eye(2) * SIDE, np.array([1.0, 2.0]))
+    scale = 3
+    x, y = np.meshgrid(np.arange(size.width * scale), np.arange(size.height * scale))
+    photo = np.stack([(x.ravel() + 0.5) / scale - 0.5, (y.ravel() + 0.5) / scale - 0.5, np.ones(x.size)])
+    matrix = image_from_plane(lattice.rx_deg, lattice.ry_deg, size=size, focal_mm=35.0).numpy()
+    plane = np.linalg.inv(matrix) @ photo
+    cell = (plane[:2] / plane[2]).T - lattice.origin
+    dark = np.round(cell / SIDE).sum(1) % 2 == 0
+    grey = np.where(dark, 0.3, 0.75).reshape(x.shape).astype(np.float32)
+    grey = cv2.resize(grey, (size.width, size.height), interpolation=cv2.INTER_AREA)
+    noise = np.random.default_rng(0).normal(0, 0.015, (size.height, size.width, 3))
+    pixels = (grey[:, :, None] + noise).clip(0, 1).astype(np.float32)
+    return Evidence(Image(pixels, np.ones(pixels.shape[:2], bool)), SearchConfig(), 35.0), lattice
+
+
+def test_a_square_of_a_chequered_floor_is_half_a_cell() -> None:
+    evidence, squares = chequered_floor()
+    found = primitive(evidence, PATTERN, fit_of(evidence, squares))
+    assert found is not None
+    theta, index = found
+    full = np.array([[1, 1], [1, -1]]) @ squares.basis
+    assert lattice_error(Lattice.of(PATTERN, theta).basis, full) < 1e-6
+    # Every second square is left: the ones of one colour, counted in the new steps.
+    points = PATTERN.points_at(index, theta).numpy() - squares.origin
+    assert set((np.round(points / SIDE).sum(1) % 2).tolist()) == {0.0}
+
+
+def test_the_full_cell_of_a_chequered_floor_stays() -> None:
+    evidence, squares = chequered_floor()
+    full = squares.with_basis(np.array([[1.0, 1.0], [-1.0, 1.0]]) @ squares.basis)
+    found = primitive(evidence, PATTERN, fit_of(evidence, full))
+    basis = full.basis if found is None else Lattice.of(PATTERN, found[0]).basis
+    assert lattice_error(basis, full.basis) < 1e-6
+
+
+def test_too_few_cells_say_nothing() -> None:
+    scene = small_scene(16)
+    fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
+    few = Fit(fit.theta, fit.index[:3], fit.contrast[:3], fit.score)
+    assert primitive(evidence_of(scene), PATTERN, few) is None
+
+
+def test_cells_of_a_single_coset_tell_nothing_apart() -> None:
+    scene = small_scene(16)
+    fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
+    ground = _Ground(fit.theta, index_in(scene))
+    assert _likeness(evidence_of(scene), PATTERN, ground, np.zeros(len(ground.index), int)) == 1.0

@@ -1,0 +1,110 @@
+"""Object patches: equal where objects turn with their ring, contrast at the right count, objects found."""
+
+import math
+
+import numpy as np
+import torch
+from drawn import DrawnRing
+
+from p3i.grammar.ast import Program
+from p3i.grammar.parser import parse
+from p3i.interp.compile import compile
+from p3i.search.look.cells import agreement
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.patches import (
+    Frames,
+    find_objects,
+    frames,
+    half_steps,
+    patch_contrast,
+    read,
+    sample_px,
+    spacing,
+)
+from p3i.search.rings import ring_filling
+
+RING = DrawnRing()
+FILLING = RING.filling()
+PATTERN, THETA = FILLING.pattern, FILLING.theta(RING.numbers(FILLING))
+INDEX = PATTERN.index.double()
+SIDE = spacing(PATTERN, THETA)
+
+
+def agreements(evidence: Evidence, where: Frames) -> torch.Tensor:
+    """How alike the first patch is to each of the others."""
+    matrix = PATTERN.image_from_plane(THETA, size=evidence.image.size, focal_mm=35.0)
+    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where).cells()
+    return agreement(cells.values[1:], cells.values[0], cells.known[1:] & cells.known[:1])
+
+
+def contrast_of(count: int, *, ring: DrawnRing = RING) -> torch.Tensor:
+    """The contrast of the draws of a ring of `count` objects through the first of `ring`."""
+    filling = ring_filling(count)
+    theta = filling.theta(ring.numbers(filling))
+    index = filling.pattern.index.double()
+    side = spacing(filling.pattern, theta)
+    found = patch_contrast(ring.evidence(), filling.pattern, theta, index, side=side, focal_mm=35.0)
+    return found.contrast
+
+
+def test_patches_that_turn_with_the_ring_are_equal_and_upright_ones_are_not() -> None:
+    evidence, turned = RING.evidence(), frames(PATTERN, THETA, INDEX, side=SIDE)
+    upright = Frames(
+        turned.origin, turned.along[:1].expand_as(turned.along), turned.across[:1].expand_as(turned.across)
+    )
+    assert float(agreements(evidence, turned).min()) > 0.85
+    assert float(agreements(evidence, upright).median()) < 0.6
+
+
+def test_a_frame_is_a_square_along_the_curve() -> None:
+    where = frames(PATTERN, THETA, INDEX, side=3.0)
+    np.testing.assert_allclose(where.along.norm(dim=1), 3.0, rtol=1e-6)
+    np.testing.assert_allclose((where.along * where.across).sum(1), 0.0, atol=1e-9)
+    outward = where.origin - torch.tensor(RING.center, dtype=torch.float64)
+    np.testing.assert_allclose((where.along * outward).sum(1), 0.0, atol=1e-6)
+    np.testing.assert_allclose(where.origin, RING.places(), atol=1e-9)
+
+
+def test_a_ring_has_contrast_at_its_count_and_none_where_half_steps_are_objects_too() -> None:
+    assert float(contrast_of(12).min()) > 0.9
+    every_other = contrast_of(6)  # half a step on is the next object
+    assert float(every_other.max()) < 0.05 and abs(float(every_other.median())) < 0.05
+
+
+def test_a_photo_without_objects_has_no_contrast() -> None:
+    nothing = DrawnRing(missing=frozenset(range(12)))
+    assert float(contrast_of(12, ring=nothing).abs().mean()) < 0.1
+
+
+def test_an_object_that_is_missing_has_no_contrast() -> None:
+    found = contrast_of(12, ring=DrawnRing(missing=frozenset({2, 7})))
+    gone = torch.zeros(12, dtype=torch.bool)
+    gone[[2, 7]] = True
+    assert float(found[gone].max()) < 0.2 < 0.7 < float(found[~gone].min())
+
+
+def test_objects_that_were_moved_are_found_where_they_are() -> None:
+    nudges = {3: (2.0, 0.0), 7: (0.0, -1.5), 10: (-1.0, 1.0)}
+    evidence = DrawnRing(nudges=nudges).evidence()
+    found = find_objects(evidence, PATTERN, THETA, INDEX, torch.ones(12), side=SIDE, focal_mm=35.0)
+    true = np.array([nudges.get(number, (0.0, 0.0)) for number in range(12)])
+    np.testing.assert_allclose(found.offsets.numpy() * SIDE, true, atol=0.15)
+    assert float(found.certainty.min()) > 0.8
+
+
+def test_the_spacing_is_that_of_neighbours() -> None:
+    assert math.isclose(SIDE, 2 * RING.radius * math.sin(math.pi / 12), rel_tol=1e-9)
+
+
+def test_the_spacing_of_thousands_of_draws_is_that_of_neighbours_too() -> None:
+    program = parse("for i in range(0, 47):\n    for j in range(0, 61):\n        Draw(x=i, y=2*j)\n")
+    assert isinstance(program, Program)
+    pattern = compile(program)
+    assert spacing(pattern, pattern.theta) == 1.0
+
+
+def test_half_steps_and_turning_follow_the_variables_that_move_the_draws() -> None:
+    row = compile(parse("SetCameraPose(rx=0, ry=0)\nfor i in range(0, 5):\n    Draw(x=9*i, y=1)\n"))
+    assert half_steps(row).tolist() == [[0.5, 0.0]]
+    assert half_steps(PATTERN).tolist() == [[0.0, 0.5]]
+    assert row.turning is None and PATTERN.turning == 1

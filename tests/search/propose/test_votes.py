@@ -1,0 +1,81 @@
+"""Proposals of rings: rotations vote for the centre, and climbing brings pose and centre close."""
+
+import cv2
+import numpy as np
+import pytest
+from drawn import DrawnRing
+
+from p3i.interp.camera import rotation
+from p3i.search.propose import votes as ring
+from p3i.search.propose.poses import pose_grid
+from p3i.search.propose.votes import RingProposal, Vote, gradient_tensor, ring_proposals, rotation_votes
+
+RING = DrawnRing()
+
+
+@pytest.fixture(scope="module")
+def votes() -> list[Vote]:
+    return rotation_votes(RING.evidence())
+
+
+@pytest.fixture(scope="module")
+def proposals(votes: list[Vote]) -> list[RingProposal]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ring, "rotation_votes", lambda evidence: votes)  # cast once
+        return ring_proposals(RING.evidence())
+
+
+def test_rotations_vote_for_the_centre_of_a_tilted_ring(votes: list[Vote]) -> None:
+    center = RING.seen(np.array([RING.center]))[0]
+    assert np.linalg.norm(votes[0].center_px - center) < 0.03 * RING.canvas.longer
+    assert [vote.worth for vote in votes] == sorted((vote.worth for vote in votes), reverse=True)
+    elsewhere = [v for v in votes if np.linalg.norm(v.center_px - center) > 0.15 * RING.canvas.longer]
+    assert votes[0].worth > 1.3 * elsewhere[0].worth
+
+
+def test_the_best_proposal_is_the_ring(proposals: list[RingProposal]) -> None:
+    best = proposals[0]
+    assert best.count == RING.count
+    assert abs(best.rx_deg - RING.rx_deg) < 3 and abs(best.ry_deg - RING.ry_deg) < 3
+    assert np.linalg.norm(best.center - RING.center) < 1
+    assert best.radius == pytest.approx(RING.radius, rel=0.1)
+
+
+def test_proposals_come_best_first(proposals: list[RingProposal]) -> None:
+    assert [one.worth for one in proposals] == sorted((one.worth for one in proposals), reverse=True)
+
+
+def test_no_proposal_says_what_a_better_one_said_and_none_is_hopeless(proposals: list[RingProposal]) -> None:
+    """Climbs from several centres end at this ring, and each would tell of it and of its neighbours."""
+    assert all(one.worth > 0.02 * proposals[0].worth for one in proposals)
+    told = [(one.count, *one.center, one.radius, one.rx_deg, one.ry_deg) for one in proposals]
+    for place, one in enumerate(told):
+        for other in told[:place]:
+            same_count = one[0] == other[0]
+            apart = np.abs(np.subtract(one[1:], other[1:])) > (1, 1, 1, 2, 2)
+            assert not same_count or apart.any()
+
+
+def test_a_double_angle_turns_twice_as_fast_as_an_edge() -> None:
+    """Black beside white: the gradient points along the ramp, and a half turn of it is no turn."""
+    rows, columns = np.mgrid[0:40, 0:40].astype(np.float32)
+    for turn_deg in (0, 30, 90, 135, 210):
+        turn = np.radians(turn_deg)
+        ramp = (columns * np.cos(turn) + rows * np.sin(turn)).astype(np.float32)
+        angle = np.angle(gradient_tensor(cv2.merge([ramp, 0 * ramp, 0 * ramp]))[20, 20])
+        assert np.cos(angle - 2 * turn) == pytest.approx(1, abs=1e-4)
+
+
+def test_the_poses_reach_the_tilt_and_leave_no_gap() -> None:
+    normals = np.array([np.asarray(_normal(*pose)) for pose in pose_grid(15.0, 62.0)])
+    tilts = np.degrees(np.arccos(normals[:, 2].clip(-1, 1)))
+    assert tilts.max() < 62.01
+    random = np.random.default_rng(0)
+    for _ in range(100):
+        tilt, around = np.radians(random.uniform(0, 55)), random.uniform(0, 2 * np.pi)
+        wanted = np.array([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)])
+        assert np.degrees(np.arccos((normals @ wanted).max().clip(-1, 1))) < 15
+
+
+def _normal(rx_deg: float, ry_deg: float) -> np.ndarray:
+    return np.asarray(rotation(rx_deg, ry_deg))[:, 2]
