@@ -19,7 +19,7 @@ LOOK, FORMS, FIT = "p3i.search.look", "p3i.search.forms", "p3i.search.fit"
 PROPOSE, EXTENT = "p3i.search.propose", "p3i.search.extent"
 JUDGE, OPTICS = "p3i.search.judge", "p3i.search.optics"
 # What goes into a search and comes out of it: leaves of its rooms.
-ANSWERS = {"p3i.search.config", "p3i.search.result", "p3i.search.record", "p3i.search.answer"}
+ANSWERS = {"p3i.search.config", "p3i.search.result", "p3i.search.answer"}
 SEARCH = "p3i.search"  # the loops that join its rooms: what stands in p3i/search itself
 LANGUAGE, CARRIED, NOTEBOOK = "p3i.language", "p3i.carried", "p3i.notebook"
 EVALUATION, API, CLI = "p3i.evaluation", "p3i.api", "p3i.cli"
@@ -65,7 +65,7 @@ HEAVY = {"torch", "torchvision", "numpy", "cv2", "PIL", "scipy", "rich"}
 GRAMMAR_MAY_IMPORT = {"lark"}
 # Files that must be importable without any heavy package: what `--help`, `check`, `fmt` and `expand` load.
 LIGHT = ["p3i", "p3i.api", "p3i.language", "p3i.carried", "p3i.cli", "p3i.grammar", *sorted(LEAVES)]
-LIGHT += [OPTIONS, "p3i.search.config", "p3i.search.result", "p3i.search.record"]
+LIGHT += [OPTIONS, "p3i.search.config", "p3i.search.result"]
 LIGHT += ["p3i.interp.unroll", "p3i.vision.picture_kinds"]
 # Packages whose own file must be empty of imports, since importing any part of them runs it.
 BARE = [

@@ -1,6 +1,5 @@
 """`p3i points`: programs, or photos, in; lists of their objects out."""
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,11 +21,11 @@ UNEXPECTED = 1
 LISTS = Kinds(
     by_suffix={f".{suffix}": kind for suffix, kind in BY_SUFFIX.items()},
     asked=FORMATS,
-    endings={"coco": ".coco.json", "labelme": ".json"},
+    endings={"coco": ".coco.json", "labelme": ".json", "yolo": ".txt"},
     text=frozenset(FORMATS),
     what="format",
 )
-"""The lists; COCO and labelme are JSON too and have to be asked for."""
+"""The lists, and what their files are called in a folder where the format has no ending of its own."""
 
 
 @grouped.command("points")
@@ -84,7 +83,7 @@ def command(**given: Any) -> int:
         seen = f"{size.width} x {size.height} px, rx {camera.rx_deg:.4g}, ry {camera.ry_deg:.4g}"
         return batch.Answer(
             make=lambda: batch.Made(each.encode(to.kind)),
-            facts=lambda: json.loads(each.encode("json")),
+            facts=each.record,
             notes=each.notes,
             info=[each.counts],
             more=[f"{seen}, focal {camera.focal_mm:.4g} mm"],

@@ -101,23 +101,25 @@ def solve(task: Task, *, update: api.Progress, note: Note | None = None) -> Outc
 
 def failure(task: Task, error: str, *, code: int, seconds: float = 0.0) -> Outcome:
     """The outcome of a photo without an answer: the sentence that says why, and its exit code."""
-    from p3i.search.record import failure_record
-
-    record = None
-    if task.as_record:
-        record = failure_record(image=str(task.photo), error=error, code=code, seconds=seconds)
-    return Outcome(photo=task.photo, record=record, error=error, code=code, seconds=seconds)
+    name = str(task.photo)
+    record = {"image": name, "program": None, "error": error, "code": code, "seconds": round(seconds, 3)}
+    return Outcome(
+        photo=task.photo,
+        record=record if task.as_record else None,
+        error=error,
+        code=code,
+        seconds=seconds,
+    )
 
 
 def _answer(task: Task, result: SynthesisResult, *, seconds: float) -> Outcome:
     """A result with a program, put into words. Raises ParseError for one that has none in its layout."""
     from p3i.grammar.printer import format_program
-    from p3i.search.record import answer_record
 
     code = 130 if result.stop is StopReason.INTERRUPTED else 0
     texts, record = (), None
     if task.as_record:
-        record = answer_record(result, image=str(task.photo), seconds=seconds)
+        record = result.record(image=str(task.photo), seconds=seconds)
     elif result.program is not None:
         layout: Literal["python", "table1"] = "table1" if task.config.strict else "python"
         others = [candidate.program for candidate in result.candidates[1 : task.config.top]]

@@ -6,10 +6,8 @@ whole numbers, as COCO's own files and tools do. Cells are cut off at the photo'
 
 from typing import Any
 
-import numpy as np
-
-from p3i.export.pixels import to_edges, within
-from p3i.place.clip import area, clipped_to_canvas
+from p3i.export.pixels import box_of, on_photo, within
+from p3i.place.clip import area
 from p3i.place.objects import Objects
 
 
@@ -17,18 +15,17 @@ def coco(found: Objects) -> dict[str, Any]:
     """`found` as a COCO dataset of one picture; objects without any area on the photo are left out."""
     annotations = []
     for each in found.objects:
-        corners = clipped_to_canvas(np.array(each.cell_px, float).reshape(-1, 2), found.size)
+        corners = on_photo(each.cell_px, found.size)
         if not len(corners):
             continue
-        polygon = within(to_edges(tuple(map(tuple, corners.tolist()))), found.size)
-        x, y = zip(*polygon, strict=True)
+        polygon = within(corners, found.size)
         annotations.append(
             {
                 "id": len(annotations) + 1,
                 "image_id": 1,
                 "category_id": 1,
                 "segmentation": [[value for corner in polygon for value in corner]],
-                "bbox": [min(x), min(y), round(max(x) - min(x), 3), round(max(y) - min(y), 3)],
+                "bbox": list(box_of(polygon)),
                 "area": round(area(corners), 3),
                 "iscrowd": 0,
                 "keypoints": [each.x_px, each.y_px, 2] if each.inside else [0, 0, 0],

@@ -4,9 +4,11 @@ import dataclasses
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from p3i.export.crops import write_crops
 from p3i.export.formats import encode
+from p3i.export.table import record
 from p3i.files import write_bytes
 from p3i.options.points import format_of
 from p3i.place.objects import Objects
@@ -20,6 +22,10 @@ class Listing(Objects):
     def of(cls, found: Objects) -> "Listing":
         """The same objects, to be written."""
         return cls(**{field.name: getattr(found, field.name) for field in dataclasses.fields(Objects)})
+
+    def record(self) -> dict[str, Any]:
+        """All that is known, as the format `json` and `--json` have it."""
+        return record(self)
 
     def encode(self, form: str) -> bytes:
         """The list as a file of the format `form` (FORMATS of the options); UsageError for another one."""

@@ -13,11 +13,11 @@ from p3i.errors import UsageError
 from p3i.records import PhotoFocal, Spelt, check_focal
 from p3i.size import Size, parse_size
 
-FORMATS = ("csv", "json", "coco", "labelme", "geojson", "svg", "dxf")
+FORMATS = ("csv", "json", "coco", "labelme", "yolo", "geojson", "svg", "dxf")
 """What a list of objects can be written as."""
 
 BY_SUFFIX = {kind: kind for kind in ("csv", "json", "geojson", "svg", "dxf")}
-"""The formats that a file's name tells; COCO and labelme are JSON too and have to be asked for."""
+"""The formats that a file's name tells; COCO and labelme (JSON too) and YOLO (text) have to be asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +35,7 @@ class PointsOptions:
         Spelt(metavar="P"),
     ] = 0.0
     outside: Annotated[bool, "List the objects that lie outside the photo too.", Spelt("--all")] = False
-    clip: Annotated[bool, "Cut the cells off at the photo's edge (COCO always does)."] = False
+    clip: Annotated[bool, "Cut the cells off at the photo's edge (COCO and YOLO always do)."] = False
     label: Annotated[str, "The class of the objects in COCO, labelme and GeoJSON.", Spelt(metavar="WORD")] = (
         "object"
     )

@@ -1,7 +1,7 @@
 """The objects of a program as a list: where each lies, what it is called, and whether the photo shows it.
 
 Convention: pixels of the photo, pixel centres at whole numbers, x right, y down; the plane in program units.
-The formats in p3i/paint/export have their own pixels and say so.
+The formats in p3i/export have their own pixels and say so.
 """
 
 from dataclasses import dataclass, field

@@ -6,9 +6,10 @@ Imports neither torch nor numpy.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import Any, Literal
 
 from p3i.grammar.ast import Program
+from p3i.grammar.printer import format_program
 
 NEEDED = 0.13
 """The score that an answer must reach (docs/benchmarks.md says what it was calibrated on)."""
@@ -55,6 +56,15 @@ class Candidate:
     focal_mm: float = 35.0
     focal_source: FocalSource = "default"
     focal_reason: str = ""
+
+    def record(self) -> dict[str, Any]:
+        """The candidate as JSON has it."""
+        return {
+            "program": format_program(self.program),
+            "structure": self.structure,
+            "focal": self.focal_mm,
+            "score": _rounded(self.score),
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,3 +113,49 @@ class SynthesisResult:
         ):
             return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
         return self.stop.value
+
+    def record(self, *, image: str | None = None, seconds: float | None = None) -> dict[str, Any]:
+        """The answer as JSON has it, a line of `p3i synth --format jsonl`; its keys in the documented order.
+
+        `image` is the photo's name and `seconds` what the search took, where they are known. `centers` are
+        pixels, to a hundredth; `program` is the canonical text in the layout "python", whatever was printed
+        elsewhere. With more than one candidate asked for, `candidates` lists them, the best first.
+        Raises ValueError for a result without a program, or a program without a canvas.
+        """
+        program = self.program
+        if program is None or program.header is None or program.header.canvas is None:
+            raise ValueError("only a program with a canvas can be recorded")
+        width, height = program.header.canvas
+        camera: dict[str, Any] = {
+            "rx": program.camera.rx_deg,
+            "ry": program.camera.ry_deg,
+            "focal": self.focal_mm,
+            "focal_from": self.focal_source,
+            "focal_reason": self.focal_reason,
+        }
+        if self.lens_k1 is not None:
+            camera["lens_k1"] = self.lens_k1
+        if self.mirrored is not None:
+            camera["mirrored"] = list(self.mirrored)
+        record: dict[str, Any] = {
+            "image": image,
+            "width": width,
+            "height": height,
+            "program": format_program(program),
+            "structure": self.structure,
+            "camera": camera,
+            "centers": [[round(x, 2), round(y, 2), i, j] for x, y, i, j in self.centers],
+            "region": [[round(x, 1), round(y, 1)] for x, y in self.region],
+            "score": _rounded(self.score),
+            "margin": _rounded(self.margin),
+            "seconds": None if seconds is None else round(seconds, 3),
+            "features": self.features,
+            "seed": self.seed,
+        }
+        if len(self.candidates) > 1:
+            record["candidates"] = [candidate.record() for candidate in self.candidates]
+        return record
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from p3i.cli.main import run
+from p3i.options.points import FORMATS
 
 TEXT = """SetCameraPose(rx=-10, ry=5)
 for i in range(-2, 3):
@@ -73,7 +74,7 @@ def test_a_name_that_cannot_be_is_a_file_error(
     assert sorted(os.listdir(folder)) == before
 
 
-@pytest.mark.parametrize("form", ["csv", "json", "coco", "labelme", "geojson", "svg"])
+@pytest.mark.parametrize("form", [form for form in FORMATS if form != "dxf"])
 def test_a_photo_whose_name_is_no_text_is_listed(
     form: str, capsysbinary: pytest.CaptureFixture[bytes]
 ) -> None:

@@ -191,17 +191,16 @@ def test_a_program_that_cannot_be_printed_costs_no_other_photo(photo, capsys) ->
 
 
 def test_an_answer_that_cannot_be_recorded_costs_no_other_photo(photo, capsys, monkeypatch) -> None:
-    from p3i.search import record
+    from p3i.search.result import SynthesisResult
 
-    def failing(result, **rest):
-        raise ArithmeticError("a number nobody foresaw")
+    honest = SynthesisResult.record
 
-    honest = record.answer_record
-    monkeypatch.setattr(
-        record,
-        "answer_record",
-        lambda result, **rest: (failing if result.structure == "circular" else honest)(result, **rest),
-    )
+    def recorded(result: SynthesisResult, **rest):
+        if result.structure == "circular":
+            raise ArithmeticError("a number nobody foresaw")
+        return honest(result, **rest)
+
+    monkeypatch.setattr(SynthesisResult, "record", recorded)
     names = [photo("a.png"), photo("b.png", FINDS_A_RING), photo("c.png")]
     assert run(["synth", *names, "-o", "out.jsonl"]) == 6
     records = [json.loads(line) for line in Path("out.jsonl").read_text().splitlines()]

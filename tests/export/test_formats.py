@@ -45,7 +45,7 @@ def board(**changes) -> Objects:
 @pytest.mark.parametrize("form", [form for form in FORMATS if form != "dxf"])
 def test_a_small_list_is_written_as_reviewed(form: str, golden: Callable[[Path, str], None]) -> None:
     for name, text in (("small", SMALL), ("rings", RINGS)):
-        ending = f"{form}.json" if form in ("coco", "labelme") else form
+        ending = {"coco": "coco.json", "labelme": "labelme.json", "yolo": "txt"}.get(form, form)
         golden(GOLDEN / f"{name}.{ending}", p3i.points(p3i.loads(HEAD + text)).encode(form).decode())
 
 
@@ -59,7 +59,8 @@ def test_an_empty_list_is_a_file_too(form: str) -> None:
     text = HEAD + SMALL.replace("20*j - 10", "20*j + 900").replace("rx=-30", "rx=0")
     found = p3i.points(p3i.loads(text))
     assert found.objects == () and found.outside == 6
-    assert found.encode(form)
+    # A YOLO file says nothing but objects: that of a picture without any is empty.
+    assert bool(found.encode(form)) == (form != "yolo")
 
 
 def test_csv_has_a_line_for_each_well() -> None:
@@ -139,6 +140,33 @@ def test_coco_cuts_cells_off_at_the_edge_of_the_photo() -> None:
         x, y, width, height = annotation["bbox"]
         assert x >= 0 and y >= 0 and x + width <= 640 + 1e-6 and y + height <= 480 + 1e-6
         assert annotation["area"] > 0
+
+
+def test_yolo_has_the_box_of_each_cell_as_shares_of_the_photo() -> None:
+    found = p3i.points(p3i.loads(HEAD.replace("640, 480", "600, 480") + BOARD))
+    lines = found.encode("yolo").decode().splitlines()
+    assert len(lines) == len(found.objects) > 80
+    for line, each in zip(lines, found.objects, strict=True):
+        label, *shares = line.split(" ")
+        assert label == "0"
+        x, y, width, height = np.array(shares, float) * (600, 480, 600, 480)
+        # Edges at whole numbers; what sticks out of the photo is cut off.
+        corners = (np.array(each.cell_px) + 0.5).clip(0, (600, 480))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        if (corners > 0).all() and (corners < (600, 480)).all():
+            assert [x - width / 2, y - height / 2] == pytest.approx(low, abs=2e-3)
+            assert [x + width / 2, y + height / 2] == pytest.approx(high, abs=2e-3)
+        assert x - width / 2 >= -1e-6 and x + width / 2 <= 600 + 1e-6 and width > 0 and height > 0
+
+
+def test_yolo_cuts_cells_off_and_leaves_out_those_beyond_the_photo() -> None:
+    program = SMALL.replace("rx=-30, ry=8", "rx=0, ry=0").replace("30*i", "70*i")
+    found = p3i.points(p3i.loads(HEAD.replace("640, 480", "100, 100") + program), outside=True)
+    boxes = [list(map(float, line.split()[1:])) for line in found.encode("yolo").decode().splitlines()]
+    assert 0 < len(boxes) < len(found.objects) == 6
+    sides = [(x - w / 2, x + w / 2, y - h / 2, y + h / 2) for x, y, w, h in boxes]
+    assert all(min(each) >= -1e-8 and max(each) <= 1 + 1e-8 for each in sides)
+    assert any(left == pytest.approx(0, abs=1e-8) for left, *_ in sides)
 
 
 def test_labelme_has_a_polygon_and_a_point_for_each_object() -> None:

@@ -9,6 +9,7 @@ import p3i
 from p3i.errors import P3IError, ProgramError
 from p3i.export.crops import crops
 from p3i.options.extend import Margins
+from p3i.options.points import FORMATS
 from p3i.vision.image import Image
 
 GRID = """SetCameraPose(rx={rx}, ry={ry})
@@ -66,7 +67,7 @@ VERBS: dict[str, Callable[[p3i.Program], object]] = {
     "render a sprite": lambda program: p3i.render(program, image=PHOTO, sprite=PHOTO).encode("pdf"),
     "show": lambda program: p3i.show(PHOTO, program).encode("png"),
     "points": lambda program: [p3i.points(program, image=PHOTO, outside=True).encode(form) for form in
-                                  ("csv", "json", "coco", "labelme", "geojson", "svg")],
+                                  FORMATS if form != "dxf"],
     "points --crops": lambda program: list(crops(p3i.points(program, image=PHOTO), PHOTO)),
     "points --crops --plain": lambda program: list(
         crops(p3i.points(program, image=PHOTO), PHOTO, straight=False)

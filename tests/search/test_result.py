@@ -3,7 +3,6 @@
 import pytest
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, Header, Program
-from p3i.search.record import answer_record
 from p3i.search.result import StopReason, SynthesisResult
 
 PROGRAM = Program(CameraPose(), Draw(x=Affine(), y=Affine()))
@@ -26,7 +25,7 @@ def test_an_answer_needs_no_reason() -> None:
 def test_only_a_program_with_a_canvas_has_a_record(program: Program | None) -> None:
     result = SynthesisResult(program=program, stop=StopReason.FOUND)
     with pytest.raises(ValueError, match="canvas"):
-        answer_record(result, image="a.jpg", seconds=1.0)
+        result.record(image="a.jpg", seconds=1.0)
 
 
 def test_a_record_tells_of_a_lens_and_of_the_other_tilt_only_where_there_is_one() -> None:
@@ -35,7 +34,7 @@ def test_a_record_tells_of_a_lens_and_of_the_other_tilt_only_where_there_is_one(
     open_tilt = SynthesisResult(
         program=program, stop=StopReason.FOUND, mirrored=(12.5, -3.25), lens_k1=-0.0312
     )
-    camera = answer_record(plain, image="a.jpg", seconds=1.0)["camera"]
+    camera = plain.record(image="a.jpg", seconds=1.0)["camera"]
     assert "mirrored" not in camera and "lens_k1" not in camera
-    camera = answer_record(open_tilt, image="a.jpg", seconds=1.0)["camera"]
+    camera = open_tilt.record(image="a.jpg", seconds=1.0)["camera"]
     assert camera["mirrored"] == [12.5, -3.25] and camera["lens_k1"] == -0.0312

@@ -14,7 +14,6 @@ from p3i.search.config import SearchConfig
 from p3i.search.families import Family
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
-from p3i.search.record import answer_record
 from p3i.search.synthesize import centers_px, focal_of
 from p3i.vision.image import Image
 
@@ -55,7 +54,7 @@ def test_an_answer_with_its_own_focal_is_told_with_it(image: Image, monkeypatch)
     assert [candidate.focal_mm for candidate in result.candidates] == [60.0, 35.0]
     headers = [candidate.program.header for candidate in result.candidates]
     assert [header.focal_mm for header in headers if header] == [60.0, 35.0]
-    record = answer_record(result, image="a.png", seconds=1.0)
+    record = result.record(image="a.png", seconds=1.0)
     assert record["camera"]["focal"] == 60.0
     assert record["camera"]["focal_reason"] == "estimated, its cell a square"
 
