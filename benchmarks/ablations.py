@@ -33,8 +33,7 @@ from p3i.errors import P3IError
 from p3i.evaluation.measures import Measures, measure
 from p3i.evaluation.score_set import Row, summarise
 from p3i.evaluation.truth import Truth, read_truth
-from p3i.search import register
-from p3i.search.look import evidence
+from p3i.search.look import correlate, evidence
 from p3i.search.propose import shifts as by_shifts
 
 Replacement = tuple[str, Callable[..., Any]]
@@ -100,7 +99,7 @@ def difference_agreement(a: Tensor, b: Tensor, known: Tensor) -> Tensor:
 
 
 def difference_correlate(planes: Tensor, known: Tensor, templates: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """In the place of `register.correlate`: the least squared difference, not the highest agreement."""
+    """In the place of `correlate.correlate`: the least squared difference, not the highest agreement."""
     count, channels, wide, _ = planes.shape
     side = templates.shape[-1]
     kernel = templates.reshape(-1, 1, side, side)
@@ -111,7 +110,7 @@ def difference_correlate(planes: Tensor, known: Tensor, templates: Tensor) -> tu
     squared = templates.square().sum(1)
     of_template = F.conv2d(known.reshape(1, count, wide, wide), squared[:, None], groups=count)[0]
     samples = F.conv2d(known, ones)[:, 0].clamp(min=1)
-    return register._peaks(1 - (energy + of_template - 2 * inner) / (2 * samples))
+    return correlate._peaks(1 - (energy + of_template - 2 * inner) / (2 * samples))
 
 
 def difference_autocorrelation(view: np.ndarray, weights: np.ndarray) -> by_shifts.Autocorrelation:

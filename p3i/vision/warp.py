@@ -3,7 +3,7 @@
 Convention: points are (x, y) in pixels of the map that is read, pixel centres at whole numbers, so the point
 (3, 5) is values[..., 5, 3] exactly. A homography `source_from_target` takes pixels of the view that is made
 to pixels of the map that is read. Reading is bilinear; beyond the outermost pixel centres the nearest pixel
-is repeated, which only `sample_valid` and `warp_valid` tell apart from the picture itself.
+is repeated, which only `sample_valid` tells apart from the picture itself.
 """
 
 import cv2
@@ -50,32 +50,11 @@ def in_frame(points_px: Tensor, size: Size) -> Tensor:
     return ((points_px >= -0.5) & (points_px <= limits)).all(-1)
 
 
-def warp(values: Tensor, source_from_target: Tensor, size: Size) -> Tensor:
-    """See a map through a homography, differentiable in both.
-
-    Shapes: values [C, H, W], source_from_target [..., 3, 3] -> [..., C, size.height, size.width]. Nothing is
-    blurred beforehand: where the view shrinks the map, reduce the map first.
-    """
-    points, _ = _points_of(source_from_target, size)
-    return sample(values, points).movedim(-1, -3)
-
-
-def warp_valid(valid: Tensor, source_from_target: Tensor, size: Size) -> Tensor:
-    """Which pixels of the view from `warp` are known; points at or behind the camera are not.
-
-    Shapes: valid [H, W] bool, source_from_target [..., 3, 3] -> [..., size.height, size.width] bool. A point
-    lies in front of the camera where the third homogeneous coordinate is positive.
-    """
-    points, in_front = _points_of(source_from_target, size)
-    return sample_valid(valid, points) & in_front
-
-
 def warp_pixels(pixels: np.ndarray, source_from_target: np.ndarray, size: Size) -> np.ndarray:
-    """`warp` for arrays without gradients, by OpenCV: several times faster on large pictures.
+    """See a picture through a homography; what lies behind the camera is filled with anything.
 
     Shapes: pixels [H, W] or [H, W, C] float32 or uint8, source_from_target [3, 3] ->
-    [size.height, size.width(, C)]. OpenCV before 5.0 rounds points to 1/32 pixel. It knows no behind: ask
-    `warp_valid`.
+    [size.height, size.width(, C)]. OpenCV before 5.0 rounds points to 1/32 pixel.
     """
     return cv2.warpPerspective(
         pixels,
@@ -126,16 +105,6 @@ def pixel_grid(
     x = torch.arange(size.width, dtype=dtype, device=device)
     y = torch.arange(size.height, dtype=dtype, device=device)
     return torch.stack(torch.meshgrid(x, y, indexing="xy"), dim=-1)
-
-
-def _points_of(source_from_target: Tensor, size: Size) -> tuple[Tensor, Tensor]:
-    """Where the pixels of a view lie in the map [..., h, w, 2], and which are in front of the camera."""
-    grid = pixel_grid(size, dtype=source_from_target.dtype, device=source_from_target.device)
-    homogeneous = torch.cat([grid, torch.ones_like(grid[..., :1])], dim=-1)
-    moved = torch.einsum("...rc,hwc->...hwr", source_from_target, homogeneous)
-    in_front = moved[..., 2] > 1e-9
-    depth = torch.where(in_front, moved[..., 2], torch.ones_like(moved[..., 2]))
-    return moved[..., :2] / depth[..., None], in_front
 
 
 def _read(values: Tensor, points_px: Tensor, *, padding: str) -> Tensor:

@@ -170,13 +170,6 @@ def render(
     )
 
 
-def overlay(
-    image: Path_ | Image, program: Program, options: RenderOptions | None = None, **changes: Any
-) -> RenderedPicture:
-    """The photo with the program drawn over it; `render` with `image`, for callers who start at the photo."""
-    return render(program, options, image=image, **changes)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Objects:
     """What a program draws: `points` [M, 2] in program units, `index` [M, 2]; far ones are counted only."""

@@ -38,7 +38,6 @@ from p3i.vision.image import Image
 from p3i.vision.picture import Picture, opacity, reframed, repainted
 from p3i.vision.sheet import project
 
-Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Progress = Callable[[str, float], None]

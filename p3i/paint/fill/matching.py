@@ -1,48 +1,23 @@
-"""What all ways to fill by other cells share: light, the last shift, trust, and what a hole's rim lacks.
+"""A source matched with what lies around its hole: its last shift, its light, and how far it is trusted.
 
 Convention: K places around a hole with colours [K, 3] (RGB in 0..1) and weights [K] by nearness; S sources.
 """
 
 from collections.abc import Callable, Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
+from p3i.paint.fill.light import matched_light
 
-# Light is matched by an offset and a gain between these, drawn towards 1 as if by that share of the variance
-# and that much besides: flat surroundings say nothing of contrast.
-_GAINS = (0.5, 2.0)
-_PRIOR = 0.1
-_PRIOR_VARIANCE = 1e-3
+Array = NDArray[np.float64]
+
 # Residuals of this size count half as much as small ones in finding a shift.
 _ROBUST = 0.02
 # A source is shifted so many times.
 _SHIFTS = 3
-# The most that is carried in from a rim.
-_MOST_CARRIED = 0.15
 # How far weights are drawn to the sources' own misfits: a share of the mean square of the residuals.
 _RIDGE = 0.3
-# What is carried in from a rim is smoothed along it over this share of the distance to the next object, times
-# each of these: near the rim its own difference counts, further in that of more.
-_SMOOTH = 0.125
-_SCALES = (0.5, 1.0, 2.0, 4.0)
-# Where the finest smoothing is over this many pixels the rim is reduced first, until it is over so many.
-_COARSE_SIGMA = 16.0
-_LEAST_SIGMA = 4.0
-
-
-def matched_light(colours: NDArray, wanted: NDArray, weights: NDArray) -> tuple[Array, Array]:
-    """The gain and offset [3] that bring colours [K, 3] closest to those wanted; 1 and 0 without weight."""
-    share = (weights / max(float(weights.sum()), 1e-9))[:, None].astype(float)
-    mean, wanted_mean = (share * colours).sum(0), (share * wanted).sum(0)
-    variance = (share * (colours - mean) ** 2).sum(0)
-    together = (share * (colours - mean) * (wanted - wanted_mean)).sum(0)
-    prior = _PRIOR * variance + _PRIOR_VARIANCE
-    gain = np.clip((together + prior) / (variance + prior), *_GAINS)
-    return gain, wanted_mean - gain * mean
 
 
 def shift_step(slopes: Sequence[NDArray], residual: NDArray, weights: NDArray) -> Array:
@@ -104,44 +79,3 @@ def aligned(
 def weighted_misfit(residual: NDArray, weights: NDArray) -> float:
     """The mean of |residual| [K, 3] by weights [K]."""
     return float((weights[:, None] * np.abs(residual)).sum() / max(float(weights.sum()), 1e-9) / 3)
-
-
-def rim_of(hole: NDArray, known: NDArray, *, reach_px: float) -> NDArray[np.bool_]:
-    """The known pixels [h, w] beside a hole [h, w], up to `reach_px` away from it."""
-    far = np.asarray(cv2.distanceTransform((hole == 0).astype(np.uint8), cv2.DIST_L2, 5))
-    return (far > 0) & (far <= reach_px) & known
-
-
-def membrane(off: NDArray, rim: NDArray[np.bool_], *, spacing_px: float) -> Floats:
-    """What a hole's rim [h, w] lacks, `off` [h, w, 3] there, carried smoothly inwards: [h, w, 3].
-
-    0 without a rim; nothing is lifted or lowered by more than `_MOST_CARRIED`.
-    """
-    limited = np.clip(off, -_MOST_CARRIED, _MOST_CARRIED).astype(np.float32)
-    return carried(limited * rim[:, :, None], rim.astype(np.float32), spacing_px=spacing_px)
-
-
-def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:
-    """What a rim lacks, carried smoothly to all pixels: `off` [h, w, 3] (0 beside the rim) -> [h, w, 3].
-
-    `rim` [h, w] is 1 on the rim, else 0; `spacing_px` is how far the next object lies. 0 without a rim.
-    """
-    height, width = rim.shape
-    finest = _SCALES[0] * _SMOOTH * spacing_px
-    if finest >= _COARSE_SIGMA:
-        # What is smooth over so many pixels is known from a reduced picture as well.
-        reduce = 2 ** int(np.log2(finest / _LEAST_SIGMA))
-        size = (-(-width // reduce), -(-height // reduce))
-        small, small_rim = (
-            np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.float32)
-            for plane in (off, rim)
-        )
-        found = carried(small, small_rim, spacing_px=spacing_px / reduce)
-        return np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
-    total, weight = np.zeros_like(off), np.zeros_like(rim)
-    for scale in _SCALES:
-        sigma = max(0.7, scale * _SMOOTH * spacing_px)
-        for plane, summed in ((off, total), (rim, weight)):
-            summed += cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / scale
-    fading = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
-    return (total * fading[:, :, None]).astype(np.float32)

@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.paint.fill.matching import membrane, rim_of, trusted
+from p3i.paint.fill.light import membrane, rim_of
+from p3i.paint.fill.matching import trusted
 from p3i.paint.fill.sources import MOST_TRIED, Ground, Hole, Source, hole_of, shown_elsewhere, sources
 from p3i.place.moves import nearest
 from p3i.place.placed import Placed

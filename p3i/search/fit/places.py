@@ -1,6 +1,6 @@
 """Fitting programs that draw on curves (rings, rings in rings, any sketch) to the objects on a photo.
 
-Each object is searched for around its place by correlation with the mean patch (patches.py), and the
+Each object is searched for around its place by correlation with the mean patch (look/patches.py), and the
 program's free numbers, the focal among them where it is free, are fitted to the places found.
 """
 

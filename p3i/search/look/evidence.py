@@ -94,7 +94,7 @@ class Evidence:
     """A photo as the search sees it. Holds the maps that were made so far, nothing else changes.
 
     `on_photo` takes points [N, 2] in pixels of `image` to pixels of the photo as it is, where that is another
-    canvas (lens.py).
+    canvas (look/straight.py).
     """
 
     image: Image

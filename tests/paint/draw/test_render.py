@@ -18,7 +18,6 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Polar, Pr
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.options.render import RenderOptions, kind_of
-from p3i.paint.draw.render import overlay
 from p3i.paint.draw.scene import Dots, Strokes, rainbow
 from p3i.records import fields_of
 from p3i.size import Size
@@ -138,18 +137,18 @@ def test_a_photo_is_straightened_back_to_the_plane_it_was_drawn_from() -> None:
 
 def test_a_photo_shows_through_where_nothing_is_drawn_over_it() -> None:
     program, image = grid(), photo(Size(200, 150))
-    picture = overlay(image, program)
+    picture = render(program, image=image)
     pixels = picture.pixels()
     assert pixels[0, 0].tolist() == [51, 102, 153]
     assert at(pixels, picture.centers_px[0]) == rainbow(np.arange(4)).tolist()[0]
     assert not any(isinstance(part, Strokes) for part in picture.scene.layers), "no cells over a photo"
-    assert any(isinstance(part, Strokes) for part in overlay(image, program, cells=True).scene.layers)
+    assert any(isinstance(part, Strokes) for part in render(program, image=image, cells=True).scene.layers)
 
 
 def test_unknown_pixels_of_a_photo_stay_transparent() -> None:
     image = photo(Size(60, 40))
     image.valid[:20] = False
-    pixels = overlay(image, grid(), markers=False).pixels()
+    pixels = render(grid(), image=image, markers=False).pixels()
     assert (pixels[:20, :, 3] == 0).all() and (pixels[20:, :, 3] == 255).all()
 
 
@@ -159,7 +158,7 @@ def test_a_photo_is_never_distorted() -> None:
 
 
 def test_a_canvas_of_another_shape_than_the_photo_is_noted() -> None:
-    picture = overlay(photo(Size(100, 100)), grid(canvas=(640, 480)))
+    picture = render(grid(canvas=(640, 480)), image=photo(Size(100, 100)))
     assert "640 x 480" in picture.notes[0] and "100 x 100" in picture.notes[0]
 
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from p3i.paint.fill.matching import aligned, matched_light, membrane, rim_of, trusted, weighted_misfit
+from p3i.paint.fill.light import matched_light, membrane, rim_of
+from p3i.paint.fill.matching import aligned, trusted, weighted_misfit
 from p3i.paint.fill.npn.window import Bank, grid, project, step_px
 
 # The surroundings that sources are weighed on reach this far, in distances between cells.
