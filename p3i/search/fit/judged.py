@@ -2,10 +2,10 @@
 
 A program of rows is judged by the cells that its draws sweep (look/cells.py), those that the picture shows
 whole. One that draws on a curve, or along one loop, sweeps no cells: patches about its draws are compared
-instead (look/patches.py). As a lattice's cells hold all of its plane, whatever point of the cell is drawn, so a
-ring is looked at in a few places of its sector beside the one that is drawn: how surely it repeats is told
-where its drawing is plain, which need not be where the objects are (the wires of a dartboard, the rim of a
-wheel).
+instead (look/patches.py). As a lattice's cells hold all of its plane, whatever point of the cell is drawn,
+so a ring is looked at in a few places of its sector beside the one that is drawn: how surely it repeats is
+told where its drawing is plain, which need not be where the objects are (the wires of a dartboard, the rim
+of a wheel).
 """
 
 from collections.abc import Callable, Iterator
