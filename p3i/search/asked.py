@@ -7,9 +7,10 @@ from collections.abc import Callable
 from p3i.errors import SketchError
 from p3i.grammar.ast import Header, Program
 from p3i.grammar.departures import departures
-from p3i.grammar.leaves import with_leaves
+from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.sketch import Hole, Sketch
 from p3i.interp.camera import Camera
+from p3i.interp.degenerate import FAR
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
@@ -107,6 +108,12 @@ def check_asked(config: SearchConfig, size: Size) -> None:
         sketch = whole_program_sketch(config.start, table1=config.strict)
     if sketch is None:
         return
+    if far := _beyond_pictures(sketch):
+        raise SketchError(
+            place=name,
+            reason=f"its number {far:g} goes beyond {FAR:,.0f}, ten thousand pictures or turns",
+            mend="write smaller numbers",
+        )
     if config.strict and (left := departures(_filled_with_something(sketch))):
         raise SketchError(
             place=name,
@@ -125,6 +132,13 @@ def check_asked(config: SearchConfig, size: Size) -> None:
             reason=f"it draws {drawn} objects at most, too few to fix camera and pattern",
             mend=f"let its loops draw {_FEWEST_OBJECTS} or more",
         )
+
+
+def _beyond_pictures(sketch: Sketch) -> float | None:
+    """A number of the sketch, or a limit of its holes, that no picture can show; fits overflow on such."""
+    limits = [limit for hole in sketch.holes for limit in (hole.start, hole.lower, hole.upper, hole.over)]
+    told = [*leaves(sketch.template).values(), *(limit for limit in limits if limit is not None)]
+    return next((number for number in told if abs(number) > FAR), None)
 
 
 def _filled_with_something(sketch: Sketch) -> Program:

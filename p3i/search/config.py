@@ -80,14 +80,14 @@ class SearchConfig:
         Spelt("--exhaustive", metavar="SECONDS"),
     ] = None
     strict: Annotated[bool, "Fit and print programs of the paper's Table 1 only."] = False
-    seed: Annotated[int, "Seed of everything random; equal seeds give equal programs."] = 0
+    seed: Annotated[int, "Seed of everything random; equal seeds give equal programs.", Spelt(metavar="N")] = 0
     time_s: Annotated[
         float | None,
         "Seconds after which the best program so far is the answer; no limit by default.",
         Spelt("--time", metavar="SECONDS"),
     ] = None
     top: Annotated[int, "How many candidates to report, the best first.", Spelt(metavar="K")] = 1
-    threads: Annotated[int, "Threads to compute with; one is fastest at these sizes."] = 1
+    threads: Annotated[int, "Threads to compute with; one is fastest at these sizes.", Spelt(metavar="N")] = 1
 
     def __post_init__(self) -> None:
         _one_of("structure", self.structure, STRUCTURES)

@@ -94,3 +94,27 @@ def test_the_walk_tries_the_shortest_sketches_that_no_family_covers(monkeypatch:
     assert asked.walk(session) == []
     assert tried.index("row") < tried.index("spiral") < tried.index("spiral with a phase")
     assert "lattice" not in tried
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"9*j": "1e300*j"},
+        {"2*j": "-2e9*j"},
+        {"rx=-30": "rx=3e307"},
+        {"x=9*j - 30": "x=20*Cos(1e300*j)"},
+        {"9*j": "??(9, 1e300)*j"},
+        {"- 30": "+ ~1e300"},
+    ],
+    ids=str,
+)
+def test_numbers_that_no_picture_shows_are_refused_before_a_search(changes: dict[str, str]) -> None:
+    text = ROW
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    holes = "??" in text or "~" in text
+    config = SearchConfig(sketch=sketch(text)) if holes else SearchConfig(start=p3i.loads(text))
+    image = program_scene(p3i.loads(ROW), 0, size=Size(80, 60)).image()
+    with pytest.raises(SketchError, match="goes beyond 1,000,000"):
+        p3i.synth(image, config)
