@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from p3i.errors import FileError
 from p3i.files import read_bytes
 from p3i.grammar.ast import Program
-from p3i.grammar.layout import source_text
+from p3i.grammar.layout import most_bytes, source_text
 from p3i.grammar.parse_error import ParseError
 from p3i.grammar.parser import parse
 from p3i.marks import PNG_KEYWORD, SVG_TAG
@@ -32,6 +32,8 @@ _NETPBM = (b"P1", b"P2", b"P3", b"P4", b"P5", b"P6", b"PF", b"Pf")
 # Pictures whose bytes tell them, and which nobody draws programs into.
 _OTHERS = (b"\xff\xd8\xff", b"%PDF", b"GIF8", b"RIFF")
 _HEAD = 4096
+# Of what has no end, such as a pipe, so much is read to see what it is.
+_MOST_DRAWN = 2**28
 
 
 def read_program(path: Place) -> Program:
@@ -57,6 +59,17 @@ def read_either(path: Place) -> "Program | Image":
     from p3i.vision.image import image_of
 
     return image_of(data, name=name)
+
+
+def read_source(path: Place) -> tuple[bytes, bool]:
+    """The text of a program or a sketch, unread as yet, and whether it was carried by a drawing.
+
+    Of a text no more is read than tells that it is too long for a program. Raises FileError where the file
+    cannot be read or is a picture without a program.
+    """
+    data = read_bytes(path, most=_MOST_DRAWN, cut=True)
+    text = _carried(data, _name(path))
+    return (data[: most_bytes() + 1], False) if text is None else (text.encode("utf-8"), True)
 
 
 def kind_of(path: Place, *, pictures: frozenset[str] = frozenset()) -> Kind:

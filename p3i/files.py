@@ -78,6 +78,13 @@ def names_folder(text: str) -> bool:
     return text.endswith(("/", os.sep)) or os.path.isdir(named(text))
 
 
+def is_stream(path: Name) -> bool:
+    """Whether a name is that of a pipe, a device or a socket, whose name tells no kind; never raises."""
+    with suppress(OSError, ValueError):
+        return not (stat.S_ISREG(kind := os.stat(path).st_mode) or stat.S_ISDIR(kind))
+    return False
+
+
 def place_of(path: Name) -> tuple[int, int] | str:
     """Where a name leads, equal for all names of one file: links are followed, and hard links are one.
 

@@ -21,8 +21,8 @@ def command(files: tuple[str, ...], strict: bool, quiet: bool, error_format: str
     """Report every error and warning in programs and sketches, each with its place and what to write instead.
 
     FILE is a program, a glob, a folder (its *.p3p files), @LIST (a text file of such names), or - for
-    standard input. Findings go to stdout; with --error-format json as one object a line. Warnings exit 0,
-    errors 4.
+    standard input; of a PNG or SVG that carries its program that one is checked. Findings go to stdout; with
+    --error-format json as one object a line. Warnings exit 0, errors 4.
     """
     as_json = error_format == "json"
     color = programs.coloured(sys.stdout)

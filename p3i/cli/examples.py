@@ -9,7 +9,12 @@ from p3i.cli import grouped, options, progress
 @grouped.command("examples")
 @click.argument("folder", metavar="DIR")
 @click.option(
-    "--seed", type=int, metavar="N", default=0, show_default=True, help="Which set; equal seeds give equal files."
+    "--seed",
+    type=int,
+    metavar="N",
+    default=0,
+    show_default=True,
+    help="Which set; equal seeds give equal files.",
 )
 @click.option("--lattices", type=int, metavar="N", default=4, show_default=True, help="How many lattices.")
 @click.option("--rings", type=int, metavar="N", default=4, show_default=True, help="How many rings and arcs.")

@@ -6,13 +6,14 @@ import click
 
 from p3i import language
 from p3i.cli import grouped, options, programs
+from p3i.cli.inputs import INPUT
 from p3i.grammar.parse_error import ParseError
 from p3i.grammar.printer import number_text
 from p3i.interp.unroll import Point
 
 
 @grouped.command("expand")
-@click.argument("file", metavar="FILE")
+@click.argument("file", metavar="FILE", type=INPUT)
 @click.option(
     "--format",
     "form",
@@ -23,14 +24,18 @@ from p3i.interp.unroll import Point
 )
 @options.error_format
 def command(file: str, form: str, error_format: str) -> int:
-    """List every draw of the program FILE (- for standard input) with its loop indices and its place.
+    """List every draw of the program FILE with its loop indices and its place.
+
+    FILE is a program, a PNG or SVG that carries it, - for standard input, or a glob, a folder or @LIST that
+    names one.
 
     x and y are in program units: hundredths of the longer side of the canvas, from its middle, x to the
     right and y down, before the camera tilts the plane. A variable without a loop counts as 0. Draws that
     coincide are all listed; nothing is left out because it lies behind the camera.
     """
+    path, source = programs.one(file)
     try:
-        points = language.expand(programs.read(file), path=programs.shown(file))
+        points = language.expand(source, path=programs.shown(path))
     except ParseError as error:
         return programs.write_errors(error, as_json=error_format == "json")
     programs.write_out(_WRITERS[form](points))

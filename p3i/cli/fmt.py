@@ -39,13 +39,14 @@ def command(
 
     FILE is a program, a glob, a folder (its *.p3p files), @LIST (a text file of such names), or - to read
     standard input and write standard output. Comments and the header block stay. A file with errors stays as
-    it is, and so does every file whose new text would not mean the same.
+    it is, and so does every file whose new text would not mean the same. Of a drawing from standard input the
+    program that it carries is written; its file stays.
     """
     if strict and layout == "python":
         raise UsageError("strict text exists in layout table1 only: leave out --layout python or --strict")
     as_json = error_format == "json"
     code = changed = 0
-    for source in programs.sources(files, as_json=as_json):
+    for source in programs.sources(files, as_json=as_json, in_place=True):
         if isinstance(source, P3IError):
             code = code or source.exit_code
             continue

@@ -12,6 +12,7 @@ from p3i.cli.inputs import PROGRAMS, Inputs, files, names_one, photos_and_progra
 from p3i.cli.photos import SUFFIXES
 from p3i.cli.pictures import prepared
 from p3i.cli.targets import Kinds
+from p3i.files import make_folder
 from p3i.options.points import BY_SUFFIX, FORMATS, PointsOptions
 from p3i.size import parse_size
 
@@ -70,6 +71,8 @@ def command(**given: Any) -> int:
     crops, expected = given["crops"], given["expect"]
     to = prepared(given, found, kinds=LISTS, alone={"--crops": crops}, read=(given["image"],))
     program = None if found.program is None else read_program(found.program)
+    if crops is not None:  # refused now rather than after a search
+        make_folder(crops)
 
     def listed(name: str, update: batch.Update) -> batch.Answer:
         # A word alone may be a photo or a program; beside a program it is a photo.

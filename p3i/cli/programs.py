@@ -7,10 +7,10 @@ from typing import TextIO
 
 import click
 
-from p3i import language
+from p3i.carried import read_source
 from p3i.cli import report
-from p3i.cli.inputs import listed
-from p3i.errors import P3IError
+from p3i.cli.inputs import files, listed
+from p3i.errors import FileError, P3IError, UsageError
 from p3i.files import gather
 from p3i.grammar.parse_error import ParseError
 
@@ -18,8 +18,13 @@ SUFFIXES = frozenset({".p3p"})
 STDIN = "-"
 
 
-def sources(words: Iterable[str], *, as_json: bool) -> Iterator[tuple[str, bytes] | P3IError]:
-    """Each input as (name, bytes), `-` is stdin. What cannot be read is reported, and given as its error."""
+def sources(
+    words: Iterable[str], *, as_json: bool, in_place: bool = False
+) -> Iterator[tuple[str, bytes] | P3IError]:
+    """Each input as (name, its text), `-` is stdin. What cannot be read is reported, and given as its error.
+
+    Of a drawing the text is the one that it carries; such a file is refused where texts change `in_place`.
+    """
     for word in words:
         try:
             paths = (
@@ -33,20 +38,23 @@ def sources(words: Iterable[str], *, as_json: bool) -> Iterator[tuple[str, bytes
             continue
         for path in paths:
             try:
-                yield path, stdin() if path == STDIN else language.read(path)
+                text, drawn = read_source(path)
+                if drawn and in_place and path != STDIN:
+                    how = f"`p3i fmt - < {path}` prints its program"
+                    raise FileError(f"{path} is a picture, and no text is written over it: {how}")
+                yield path, text
             except P3IError as error:
                 report.p3i_error(error, as_json=as_json)
                 yield error
 
 
-def read(word: str) -> bytes:
-    """The bytes of one input, `-` being stdin. Raises FileError."""
-    return stdin() if word == STDIN else language.read(word)
-
-
-def stdin() -> bytes:
-    """Standard input, as far as a program's text may reach."""
-    return language.read(STDIN)
+def one(word: str) -> tuple[str, bytes]:
+    """The one program that a word names, as (name, its text). Raises FileError, UsageError for several."""
+    paths = (STDIN,) if word == STDIN else files([word], suffixes=SUFFIXES)
+    if len(paths) != 1:
+        raise UsageError(f"{word} names {len(paths)} programs: name one")
+    (path,) = paths
+    return path, read_source(path)[0]
 
 
 def shown(path: str) -> str:

@@ -68,8 +68,10 @@ from p3i.search.result import Candidate, StopReason
 def command(**given: Any) -> int:
     """Find the camera and the program of the pattern on each PHOTO.
 
-    PHOTO is a file, a glob, a folder, @LIST (a text file of such names) or - (stdin). Prints the program of a single photo on stdout. Exits with 5 where there is no regular pattern, and
-    with 6 where only some of many photos have one. Ctrl-C prints the best program so far.
+    PHOTO is a file, a glob, a folder, @LIST (a text file of such names) or - (stdin).
+
+    Prints the program of a single photo on stdout. Exits with 5 where there is no regular pattern, and with 6
+    where only some of many photos have one. Ctrl-C prints the best program so far.
     """
     return run(Call.of(given))
 

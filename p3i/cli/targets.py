@@ -54,6 +54,8 @@ class Kinds:
             return self.all[0]
         suffix = Path(output).suffix.lower()
         if suffix not in self.by_suffix:
+            if files.is_stream(output):
+                return self.all[0]
             known = ", ".join(self.by_suffix)
             more = ", or say --format" if self.asked else ""
             raise UsageError(f"cannot tell the {self.what} from {output!r}: end the name in {known}{more}")

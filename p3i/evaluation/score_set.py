@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -194,9 +195,32 @@ def _answers(
     if jobs == 1:
         yield from (_answer(photo, config) for photo in photos)
         return
-    # A fresh process each: torch and OpenCV do not survive a fork with their threads.
+    place = 0
+    while place < len(photos):
+        try:
+            for answer in _side_by_side(photos[place:], config, jobs):
+                yield answer
+                place += 1
+        except BrokenProcessPool:  # by which of those at work is not known, so that the first is tried alone
+            yield _alone(photos[place], config)
+            place += 1
+
+
+def _side_by_side(
+    photos: Sequence[Path], config: SearchConfig, jobs: int
+) -> Iterable[tuple[dict[str, Any], float, float]]:
+    # Spawned: torch and OpenCV do not survive a fork with their threads.
     with concurrent.futures.ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
         yield from pool.map(_answer, photos, [config] * len(photos))
+
+
+def _alone(photo: Path, config: SearchConfig) -> tuple[dict[str, Any], float, float]:
+    """The record of a photo from a process of its own; one that the system ends is a record too."""
+    try:
+        return next(iter(_side_by_side([photo], config, 1)))
+    except BrokenProcessPool:
+        error = "the system ended the process for this photo, perhaps for want of memory"
+        return {"image": photo.name, "program": None, "error": error}, 0.0, 0.0
 
 
 def _photo(folder: Path, file: str) -> Path:

@@ -35,7 +35,9 @@ class InpaintOptions:
         Path | None, "With npn: a file that the training is kept in, and goes on from where it exists."
     ] = None
     seed: Annotated[int, "With npn and patchmatch: the seed of what is random.", Spelt(metavar="N")] = 0
-    device: Annotated[str, "With npn: where the network runs: auto, cpu, cuda, ...", Spelt(metavar="NAME")] = "auto"
+    device: Annotated[
+        str, "With npn: where the network runs: auto, cpu, cuda, ...", Spelt(metavar="NAME")
+    ] = "auto"
     threads: Annotated[int, "With npn: threads of the network.", Spelt(metavar="N")] = 1
     focal_mm: PhotoFocal = None
 

@@ -80,7 +80,9 @@ class SearchConfig:
         Spelt("--exhaustive", metavar="SECONDS"),
     ] = None
     strict: Annotated[bool, "Fit and print programs of the paper's Table 1 only."] = False
-    seed: Annotated[int, "Seed of everything random; equal seeds give equal programs.", Spelt(metavar="N")] = 0
+    seed: Annotated[
+        int, "Seed of everything random; equal seeds give equal programs.", Spelt(metavar="N")
+    ] = 0
     time_s: Annotated[
         float | None,
         "Seconds after which the best program so far is the answer; no limit by default.",

@@ -70,3 +70,18 @@ def test_what_cannot_be_expanded_is_4_with_its_place(
 
 def test_a_missing_file_is_3(tmp_path: Path) -> None:
     assert run(["expand", str(tmp_path / "none.p3p")]) == 3
+
+
+def test_the_one_program_may_come_from_a_list_a_glob_or_a_folder(
+    ring: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = Path(ring).parent
+    (folder / "list.txt").write_text(f"{ring}\n")
+    assert run(["expand", ring]) == 0
+    shown = capsys.readouterr().out
+    for word in (f"@{folder}/list.txt", f"{folder}/r*.p3p", str(folder)):
+        assert run(["expand", word]) == 0
+        assert capsys.readouterr().out == shown
+    (folder / "another.p3p").write_text(RING)
+    assert run(["expand", str(folder)]) == 2
+    assert "2 programs" in capsys.readouterr().err

@@ -2,6 +2,9 @@
 
 import importlib
 import json
+import os
+import threading
+import time
 from pathlib import Path
 
 import click
@@ -174,3 +177,48 @@ def test_a_shared_option_has_one_meaning() -> None:
             o.help for each in commands for o in each.params if isinstance(o, click.Option) and word in o.opts
         }
         assert len(helps) == 1, helps
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes of POSIX")
+@pytest.mark.parametrize("verb", ["show", "rectify", "points", "score", "render"])
+def test_a_pipe_that_is_called_anything_takes_the_first_kind(verb: str, folder: Path, capsys) -> None:
+    os.mkfifo("anything")
+    words = ["render", "grid.p3p"] if verb == "render" else call(verb, "photos/a.png")
+    end = os.open("anything", os.O_RDONLY | os.O_NONBLOCK)
+    read: list[bytes] = []
+    reader = threading.Thread(target=lambda: read.append(_until_closed(end)))
+    reader.start()
+    try:
+        assert run([*words, "-o", "anything"]) == 0, capsys.readouterr().err
+    finally:
+        reader.join(30)
+        os.close(end)
+    assert len(read[0]) > 20 and Path("anything").is_fifo()
+
+
+def _until_closed(end: int) -> bytes:
+    """What is written into a pipe until nobody holds it open."""
+    parts: list[bytes] = []
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        try:
+            part = os.read(end, 65536)
+        except BlockingIOError:
+            part = None
+        if part:
+            parts.append(part)
+        elif part == b"" and parts:
+            break
+        else:
+            time.sleep(0.01)
+    return b"".join(parts)
+
+
+def test_a_folder_for_crops_that_cannot_be_is_refused_before_a_search(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def searched(*_: object, **__: object) -> None:
+        raise AssertionError("searched for nothing")
+
+    monkeypatch.setattr(search, "synth", searched)
+    assert run(["points", "photos/a.png", "--crops", "grid.p3p"]) == 3

@@ -67,6 +67,43 @@ def test_the_verbs_on_text_read_a_pipe_too(verb: str, folder: Path, monkeypatch:
     assert run([verb, "-"]) == 0
 
 
+@pytest.mark.parametrize("kind", ["png", "svg"])
+@pytest.mark.parametrize("verb", sorted(ON_TEXT))
+def test_the_verbs_on_text_read_what_a_drawing_carries(
+    verb: str, kind: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    assert run([verb, "grid.p3p"]) == 0  # which fmt brings into its canonical form
+    assert run(["render", "grid.p3p", "-q", "-o", f"drawn.{kind}"]) == 0
+    capsys.readouterr()
+    pipe(monkeypatch, (folder / "grid.p3p").read_bytes())
+    assert run([verb, "-"]) == 0
+    of_text = capsys.readouterr().out
+    pipe(monkeypatch, (folder / f"drawn.{kind}").read_bytes())
+    assert run([verb, "-"]) == 0
+    assert capsys.readouterr().out == of_text
+    if verb != "fmt":
+        assert run([verb, f"drawn.{kind}"]) == 0
+        assert capsys.readouterr().out == of_text
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+@pytest.mark.parametrize("option", ["--layout=python", "--check", "--diff"])
+def test_fmt_writes_no_text_over_a_drawing(kind: str, option: str, folder: Path, capsys) -> None:
+    assert run(["render", "grid.p3p", "-q", "-o", f"drawn.{kind}"]) == 0
+    before = (folder / f"drawn.{kind}").read_bytes()
+    assert run(["fmt", option, f"drawn.{kind}", "grid.p3p"]) == 3
+    assert f"drawn.{kind} is a picture" in unstyle(capsys.readouterr().err)
+    assert (folder / f"drawn.{kind}").read_bytes() == before
+
+
+@pytest.mark.parametrize("verb", sorted(ON_TEXT))
+def test_a_picture_without_a_program_is_a_file_error_of_the_verbs_on_text(
+    verb: str, folder: Path, capsys
+) -> None:
+    assert run([verb, "photo.png"]) == 3
+    assert "photo.png carries no program" in unstyle(capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import solvers
 
 from p3i import api
 from p3i.cli.main import run
 from p3i.errors import FileError
+from p3i.evaluation import score_set
 from p3i.evaluation.annotations import annotation
 from p3i.evaluation.measures import Measures, f1, measure
 from p3i.evaluation.scenes import Scene, scene
@@ -217,3 +219,17 @@ def test_nothing_left_to_score_is_said(lattice: Scene, tmp_path: Path, capsys) -
     (tmp_path / "r.jsonl").write_text("nothing\n")
     assert run(["eval", str(folder), "--results", str(tmp_path / "r.jsonl")]) == 3
     assert capsys.readouterr().err.count("error: ") == 3
+
+
+def test_a_process_that_the_system_ends_costs_its_own_photo_only(
+    lattice: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ["a_quick", "b_slow", "c_killed", "d_quick"]
+    told = [annotation(lattice, f"images/{name}.png") for name in names]
+    (tmp_path / "annotations.json").write_text(json.dumps(told))
+    monkeypatch.setattr(score_set, "_answer", solvers.measured)
+    found = api.eval_set(tmp_path, jobs=2)
+    assert [row.file for row in found.rows] == [f"images/{name}.png" for name in names]
+    errors = [row.error for row in found.rows]
+    assert errors[:2] == ["answered"] * 2 and errors[3] == "answered"
+    assert "ended the process" in errors[2] and "memory" in errors[2]
