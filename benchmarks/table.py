@@ -2,10 +2,10 @@
 
 python benchmarks/table.py oriented=results.json rgb=rgb.json --annotations annotations.json
 
-A results file holds `rows`, one a photo, with the measures that docs/benchmarks.md explains, and the CPU
-seconds (`cpu`) and peak memory (`peak_mb`) of the whole run. The annotations tell the kind of each photo:
-those of boards and printed grids have a `category`. The first file gives the table by kind, all give a line
-each of the second table.
+A results file is what `p3i eval --out` writes: `rows`, one a photo, with the measures that
+docs/benchmarks.md explains, and the CPU seconds (`cpu`) and peak memory (`peak_mb`) of the whole run. The
+annotations tell the kind of each photo: those of boards and printed grids have a `category`. The first file
+gives the table by kind, all give a line each of the second table.
 """
 
 import argparse

@@ -87,6 +87,13 @@ def test_principal_components_hold_the_most_energy_and_keep_distances():
     )
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_how_many_components_hold_energy_does_not_depend_on_the_unit(scale):
+    mixing = torch.randn(9, 3, generator=GENERATOR.manual_seed(3))
+    values = scale * (mixing @ noise(3, 40, 50).reshape(3, -1)).reshape(9, 40, 50)
+    assert len(principal(values, torch.ones(40, 50, dtype=torch.bool), 6)) == 3
+
+
 def test_principal_components_do_not_depend_on_the_sign_that_a_solver_happens_to_give():
     values = noise(4, 30, 30)
     valid = torch.ones(30, 30, dtype=torch.bool)

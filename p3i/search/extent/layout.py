@@ -16,6 +16,7 @@ from p3i.search.extent.presence import find_extent
 from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
 from p3i.search.fit.robust import fit_instances
+from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
@@ -24,10 +25,6 @@ from p3i.search.look.evidence import Evidence, Level
 from p3i.search.look.thinned import thinned
 from p3i.vision.warp import in_frame
 
-# Numbers in a program: angles to a thousandth of a degree, lengths to a ten-thousandth of a unit, which is
-# a hundredth of a pixel at the far end of a long row in a large photo.
-_ANGLE_DIGITS = 3
-_LENGTH_DIGITS = 4
 # The last fit: on a map sharper by this, with so many samples along a cell's side, on at most so many objects
 # and at least so few, so many times.
 _SHARPER = 0.4
@@ -68,7 +65,7 @@ class Layout:
         origin = self.lattice.origin + i_skip * u + j_skip * v
 
         def length(value: float) -> float:
-            return round(float(value), _LENGTH_DIGITS)
+            return round(float(value), LENGTH_DIGITS)
 
         body: Draw | If = Draw(
             Affine(length(u[0]), length(v[0]), length(origin[0])),
@@ -77,9 +74,7 @@ class Layout:
         for a, b, c in reversed(self.guards):
             body = If(Affine(a, b, a * i_skip + b * j_skip - c), body)
         inner = For("j", Affine(constant=j_start), Affine(constant=j1 - j_skip), body)
-        pose = CameraPose(
-            round(self.lattice.rx_deg, _ANGLE_DIGITS), round(self.lattice.ry_deg, _ANGLE_DIGITS)
-        )
+        pose = CameraPose(round(self.lattice.rx_deg, ANGLE_DIGITS), round(self.lattice.ry_deg, ANGLE_DIGITS))
         return Program(pose, For("i", Affine(constant=i_start), Affine(constant=i1 - i_skip), inner))
 
 

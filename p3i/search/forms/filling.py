@@ -27,8 +27,10 @@ from p3i.interp.unroll import edges, live_indices, nest
 from p3i.search.forms.ranges import Range, default_range
 from p3i.search.look.thinned import thinned
 
-_ANGLE_DIGITS = 3
-_LENGTH_DIGITS = 4
+ANGLE_DIGITS, LENGTH_DIGITS = 3, 4
+"""Numbers in an answer: the camera to a thousandth of a degree, the rest to a ten-thousandth of a unit, which
+is a hundredth of a pixel at the far end of a long row in a large photo."""
+
 # So many combinations of the ends of all extents are tried at first.
 _MOST_COMBINED = 256
 
@@ -103,7 +105,7 @@ class Filling:
         """The sketch filled: numbers rounded as in every answer, limits kept, plain numbers as written."""
         found: dict[str, float] = {}
         for unknown, value in zip(self.moving, z.tolist(), strict=True):
-            digits = _ANGLE_DIGITS if unknown.name.startswith("camera.") else _LENGTH_DIGITS
+            digits = ANGLE_DIGITS if unknown.name.startswith("camera.") else LENGTH_DIGITS
             if unknown.range.turns and not unknown.hard:
                 value %= 360
             value = round(value, digits)

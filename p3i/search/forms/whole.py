@@ -11,12 +11,17 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.pattern import moving_leaves
-from p3i.search.forms.filling import Filling, fillings, start_values, unknowns_of, whole_program_sketch
+from p3i.search.forms.filling import (
+    LENGTH_DIGITS,
+    Filling,
+    fillings,
+    start_values,
+    unknowns_of,
+    whole_program_sketch,
+)
 
 # A step of the angle whose multiple comes back to within so much closes a ring, and stays.
 _CLOSED_DEG = 1e-6
-# Numbers of a program are rounded as in extent/layout.py.
-_LENGTH_DIGITS = 4
 # All that a program can draw.
 _ALL = 10**9
 
@@ -42,7 +47,7 @@ def scaled(program: Program, factor: float) -> Program:
     if factor == 1:
         return program
     lengths = {
-        path: round(value * factor, _LENGTH_DIGITS)
+        path: round(value * factor, LENGTH_DIGITS)
         for path, value in moving_leaves(program).items()
         if path.startswith("draw.") and ".angle." not in path
     }

@@ -12,7 +12,7 @@ from truth import PATTERN, blank_level, lattice_error, pose_error_deg, turned
 from p3i.search.config import SearchConfig
 from p3i.search.fit.robust import fit_instances, robust_fit
 from p3i.search.forms.lattice import Lattice, map_from_index
-from p3i.search.look.correlate import Instances, find_instances
+from p3i.search.look.correlate import Instances, correlate, find_instances
 from p3i.search.look.evidence import Evidence
 from p3i.vision.image import Image
 
@@ -61,6 +61,22 @@ def test_known_shifts_are_found_to_a_few_hundredths_of_a_cell() -> None:
     away -= np.median(away, axis=0)
     assert np.median(np.abs(away)) < 0.02
     assert np.abs(away).max() < 0.06
+
+
+def test_a_peak_between_samples_is_found_to_a_tenth_of_one() -> None:
+    """A smooth hill on a plane, and the same hill as the template: places lie between the samples."""
+    rows, columns = torch.meshgrid(torch.arange(16.0), torch.arange(16.0), indexing="ij")
+
+    def hill(row: float, column: float) -> torch.Tensor:
+        return torch.exp(-((rows - row) ** 2 + (columns - column) ** 2) / (2 * 2.5**2))
+
+    places = [(7.5, 7.5), (7.8, 7.2), (6.1, 8.85), (8.4, 7.5)]
+    planes = torch.stack([hill(*place) for place in places])[:, None]
+    template = hill(7.5, 7.5)[4:12, 4:12].expand(len(places), 1, 8, 8)
+    offsets, _, lead = correlate(planes, torch.ones_like(planes), template)
+    expected = np.array(places) - 7.5
+    np.testing.assert_allclose(offsets.numpy(), expected, atol=0.1)
+    assert (lead > 0.1).all()
 
 
 def test_objects_in_their_places_have_no_offset_and_much_certainty() -> None:
