@@ -6,10 +6,8 @@ import cv2
 import numpy as np
 
 from p3i import loads
-from p3i.paint.fill.npn.gather import Stack, gather
 from p3i.paint.fill.npn.lessons import lessons
-from p3i.paint.fill.npn.paint import part_on_window
-from p3i.paint.fill.npn.window import Bank, Pyramid, bank_of, window_of
+from p3i.paint.fill.npn.window import Stack, Window, gather, window_of
 from p3i.place.placed import Placed, placed
 from p3i.vision.image import Image
 
@@ -63,15 +61,14 @@ def scene() -> Scene:
     return Scene(Image(pixels, np.ones((height, width), bool)), laid, hole)
 
 
-def bank(found: Scene) -> tuple[Bank, np.ndarray]:
-    """The scene's bank of windows, and its hole on the window."""
-    window = window_of(found.placed, found.hole, working_px=48)
-    return bank_of(Pyramid(found.corrupted), found.placed, window), part_on_window(found.hole, window)
+def window(found: Scene) -> Window:
+    """The window of the scene's hole."""
+    return window_of(found.corrupted, found.placed, found.hole, working_px=48)
 
 
 def stacks(found: Scene, *, count: int = 24) -> tuple[Stack, list[Stack], list[Stack]]:
     """The hole's own stack, stacks to learn from, and stacks to judge by."""
-    windows, hole = bank(found)
-    own = gather(windows, hole)
+    seen = window(found)
+    own = gather(seen, seen.hole, seen.views[0], most=10)
     assert own is not None
-    return own, *lessons(windows, hole, count=count, most=6, seed=0)
+    return own, *lessons(seen, count=count, most=6, seed=0)

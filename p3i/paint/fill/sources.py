@@ -125,22 +125,24 @@ def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed) -> Hole:
     return Hole(target, points, around.astype(float), weights, colours, spacing)
 
 
-def sources(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> list[Source]:
-    """The sources of a hole among the `most` nearest objects, the likest first.
+def sources(
+    hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED, kept: int = _MOST_KEPT
+) -> list[Source]:
+    """The sources of a hole among the `most` nearest objects, the likest first, so many as are `kept`.
 
     There are none where the program draws nothing like it in sight.
     """
     if not len(hole.around):
         return []
-    found = [_aligned(hole, ground, matrix) for matrix in _laid_on(hole, ground, placed, most=most)]
+    found = [_aligned(hole, ground, matrix) for matrix in laid_on(hole, ground, placed, most=most)]
     alike = sorted((one for one in found if one is not None), key=lambda source: source.misfit)
-    return [one for one in alike if one.misfit <= _WORSE * alike[0].misfit + _WORSE_ANYWAY][:_MOST_KEPT]
+    return [one for one in alike if one.misfit <= _WORSE * alike[0].misfit + _WORSE_ANYWAY][:kept]
 
 
 def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> Mask:
     """Which of a hole's pixels [L] the photo knows on the ground of one of the `most` nearest objects."""
     shown = np.zeros(len(hole.points), bool)
-    for matrix in _laid_on(hole, ground, placed, most=most):
+    for matrix in laid_on(hole, ground, placed, most=most):
         at, front = project(matrix, hole.points)
         shown |= front & ground.known(at)
         if shown.all():
@@ -148,7 +150,7 @@ def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = M
     return shown
 
 
-def _laid_on(hole: Hole, ground: Ground, placed: Placed, *, most: int) -> Iterator[Array]:
+def laid_on(hole: Hole, ground: Ground, placed: Placed, *, most: int) -> Iterator[Array]:
     """The photo's matrices [3, 3] that take the hole to its like on other drawn ground, the nearest first."""
     pixels, _ = placed.centers_px()
     away = np.hypot(*(pixels - pixels[hole.target]).T)
@@ -185,11 +187,8 @@ def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
     def read(shift: Array) -> Floats:
         return taken(ground.pixels, at + shift)
 
-    def slopes(shift: Array) -> list[Floats]:
-        return [read(shift + half) - read(shift - half) for half in np.array([(0.5, 0.0), (0.0, 0.5)])]
-
     most_px = _MOST_SHIFT * hole.spacing_px
-    return Source(from_hole, *aligned(read, slopes, hole.colours, weights, most_px=most_px))
+    return Source(from_hole, *aligned(read, hole.colours, weights=weights, most_px=most_px))
 
 
 def _spacing(placed: Placed, target: int) -> float:

@@ -119,12 +119,12 @@ def _filled(
     """The colours of a hole's pixels [L, 3], and which of them any source shows [L]."""
     if not found:
         return np.zeros((len(hole.points), 3), np.float32), np.zeros(len(hole.points), bool)
-    weights = _weights(hole, ground, found)
-    colours, weight = _mixed(hole.points, ground, found, weights, sharp=True)
+    weights = weighed(hole, ground, found)
+    colours, weight = mixed(hole.points, ground, found, weights, sharp=True)
     return np.clip(colours + _carried(hole, ground, found, weights, shown, before), 0, 1), weight > 1e-6
 
 
-def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
+def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
     residuals = []
     for source in found:
@@ -135,13 +135,16 @@ def _weights(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     return trusted(np.stack(residuals), hole.weights, np.array([source.misfit for source in found]))
 
 
-def _mixed(
+def mixed(
     points: Array, ground: Ground, found: list[Source], weights: Array, *, sharp: bool
 ) -> tuple[Floats, Array]:
-    """The sources' colours at the hole's points, mixed [L, 3], and the weight of those that show them [L]."""
+    """The sources' colours at the hole's points, mixed [L, 3], and the weight of those that show them [L].
+
+    Each of the `weights` is one number a source, [S], or one for each point, [S, L].
+    """
     total, weight = np.zeros((len(points), 3)), np.zeros(len(points))
     for source, share in zip(found, weights, strict=True):
-        if share < 1e-4:
+        if np.max(share) < 1e-4:
             continue
         at, front = source.where(points)
         shown = share * (front & ground.known(at))
@@ -170,7 +173,7 @@ def _carried(
     rim_rows, rim_columns = np.nonzero(rim_of(inside, known, reach_px=_RIM_PX))
     if not len(rim_rows):
         return np.zeros((len(hole.points), 3), np.float32)
-    colours, weight = _mixed(
+    colours, weight = mixed(
         np.stack([rim_columns + low[0], rim_rows + low[1]], 1).astype(float),
         ground,
         found,

@@ -17,7 +17,7 @@ from p3i.paint.fill.npn.training import Training
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
 
-_VERSION = 1
+_VERSION = 2
 # These may change between two runs of one training.
 _FREE = ("steps", "time_s", "device", "threads", "checkpoint")
 

@@ -9,9 +9,9 @@ import time
 import numpy as np
 import torch
 
-from p3i.paint.fill.npn.gather import Stack, gather
 from p3i.paint.fill.npn.network import Batch
-from p3i.paint.fill.npn.window import Bank
+from p3i.paint.fill.npn.window import Stack, Window, gather
+from p3i.paint.fill.sources import Mask
 
 # One in so many of the cells is kept to judge by.
 _JUDGE = 6
@@ -22,21 +22,16 @@ _AT_MOST = 6
 
 
 def lessons(
-    bank: Bank,
-    hole: np.ndarray,
-    *,
-    count: int,
-    most: int,
-    seed: int,
-    until: float | None = None,
+    window: Window, *, count: int, most: int, seed: int, until: float | None = None
 ) -> tuple[list[Stack], list[Stack]]:
-    """Stacks to learn from and stacks to judge by, of different cells; `hole` bool [h, w] is the true one.
+    """Stacks to learn from and stacks to judge by, of different cells, with at most so many sources each.
 
     About `count` together; fewer, or none, where few cells are known, or where the clock (time.monotonic)
     says it is after `until`.
     """
     chance = np.random.default_rng(seed)
-    able = [place for place in range(1, len(bank.cells)) if _teaches(bank, hole, place)]
+    known = [window.seen(view)[1] for view in window.views]
+    able = [place for place in range(1, len(known)) if _teaches(window.hole, known[place])]
     if len(able) < 2:
         return [], []
     order = [able[place] for place in chance.permutation(len(able))]
@@ -48,12 +43,8 @@ def lessons(
         if len(learned) + len(judged) >= count or late:
             break
         place = order[turn % len(order)]
-        drawn = _cut(bank, hole, place, chance, own=turn < len(order) or bool(chance.random() < 0.6))
-        cut = np.zeros_like(drawn)
-        cut[bank.window.core] = drawn[bank.window.core]
-        if cut.sum() < 4 or not bank.known[place][cut].all():
-            continue
-        found = gather(bank, cut, target=place, most=most)
+        cut = known[place] & _cut(window, chance, own=turn < len(order) or bool(chance.random() < 0.6))
+        found = gather(window, cut, window.views[place], most=most) if cut.sum() >= 4 else None
         if found is not None:
             (judged if place in judges else learned).append(found)
     if not learned:
@@ -61,36 +52,33 @@ def lessons(
     return learned, judged
 
 
-def _teaches(bank: Bank, hole: np.ndarray, place: int) -> bool:
-    """Whether the truth under the hole is known in that cell's window, and most of its surroundings."""
-    known = bank.known[place]
-    inside = bank.home[0] & hole
-    alike = not inside.any() or bank.home[place][inside].mean() >= 0.6
-    return bool(alike and known[hole].mean() >= 0.98 and known[~hole].mean() >= 0.4)
+def _teaches(hole: Mask, known: Mask) -> bool:
+    """Whether the truth under the hole [h, w] is known in a view, and some of its surroundings."""
+    return bool(known[hole].mean() >= 0.98 and known[~hole].mean() >= 0.4)
 
 
-def _cut(bank: Bank, hole: np.ndarray, place: int, chance: np.random.Generator, *, own: bool) -> np.ndarray:
-    """A hole in that cell's window: the true one, perhaps shifted; else a box."""
+def _cut(window: Window, chance: np.random.Generator, *, own: bool) -> Mask:
+    """A hole [h, w] in another view: the true one, perhaps shifted; else a box."""
+    hole, pitch = window.hole, window.pitch_px
     height, width = hole.shape
-    pitch = bank.window.pitch
     if own:
         # Straight from the task itself; some shifted, that the network does not learn one outline by heart.
         if chance.random() < 0.5:
-            return hole & bank.known[place]
+            return hole
         by = np.round(chance.uniform(-0.25, 0.25, 2) * pitch).astype(int)
         moved = np.zeros_like(hole)
         rows, columns = np.nonzero(hole)
         rows, columns = rows + by[0], columns + by[1]
         kept = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
         moved[rows[kept], columns[kept]] = True
-        return moved & bank.known[place]
+        return moved
     rows, columns = np.nonzero(hole)
     sides = np.maximum(2, np.round(chance.uniform(0.3, 1.2, 2) * pitch)).astype(int)
     middle = chance.integers(len(rows))
     top, left = rows[middle] - sides[0] // 2, columns[middle] - sides[1] // 2
     box = np.zeros_like(hole)
     box[max(0, top) : top + sides[0], max(0, left) : left + sides[1]] = True
-    return box & bank.known[place]
+    return box
 
 
 def batch_of(stacks: list[Stack], *, device: torch.device) -> Batch:

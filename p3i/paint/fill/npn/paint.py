@@ -1,7 +1,7 @@
 """`paint`: the neural painting network from a photo and a hole to the filled photo."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import cv2
@@ -12,14 +12,15 @@ from p3i.errors import UsageError
 from p3i.options.npn import NetworkOptions
 from p3i.paint.fill.filled import Filled, share_text
 from p3i.paint.fill.npn import checkpoint
-from p3i.paint.fill.npn.gather import Stack, gather
 from p3i.paint.fill.npn.lessons import batch_of, lessons
 from p3i.paint.fill.npn.network import Painted, painted_all_ways, plain
 from p3i.paint.fill.npn.training import EVERY, Progress, begun, train
-from p3i.paint.fill.npn.window import Bank, Pyramid, Window, bank_of, project, step_px, window_of
-from p3i.paint.fill.stack import fill_by_stack
+from p3i.paint.fill.npn.window import gather, window_of
+from p3i.paint.fill.sources import Floats, Ground, Mask
+from p3i.paint.fill.stack import fill_by_stack, mixed
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
+from p3i.vision.sheet import project
 from p3i.vision.threads import limited_threads
 from p3i.vision.warp import taken
 
@@ -49,7 +50,7 @@ def paint(
     device = _device(options.device)
     result, bare = fill_by_stack(photo.pixels, photo.valid, hole, placed)
     untaught, useless = bare.copy(), np.zeros_like(hole)
-    pyramid = Pyramid(replace(photo, valid=photo.valid & ~hole))
+    filled = Image(result.copy(), photo.valid & ~hole)
     key = checkpoint.fingerprint(photo, placed, hole, options) if options.checkpoint else ""
     begin = time.monotonic()
     count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
@@ -58,7 +59,7 @@ def paint(
             part = labels == place
             until = None if options.time_s is None else begin + options.time_s * place / (count - 1)
             turn = _Turn(place, count - 1, key, until, device, progress)
-            outcome = _change(pyramid, placed, (part, result[part]), options, turn)
+            outcome = _change(filled, placed, part, options, turn)
             if isinstance(outcome, str):
                 (untaught if outcome == "untaught" else useless)[part] = True
             else:
@@ -92,21 +93,14 @@ class _Turn:
 
 
 def _change(
-    pyramid: Pyramid,
-    placed: Placed,
-    piece: tuple[np.ndarray, np.ndarray],
-    options: NetworkOptions,
-    turn: _Turn,
-) -> "np.ndarray | Literal['untaught', 'useless']":
-    """What the network adds [L, 3] to the stack's fill of one part of the hole, or why it adds nothing.
+    filled: Image, placed: Placed, part: Mask, options: NetworkOptions, turn: _Turn
+) -> "Floats | Literal['untaught', 'useless']":
+    """What the network adds [L, 3] to the stack's fill of a part [H, W] of the hole, or why it adds nothing.
 
-    `piece`: the part, bool [H, W], and the colours [L, 3] that the stack has filled it with.
+    `filled` is the photo with that fill, where it is not valid.
     """
-    part, filled = piece
-    window = window_of(placed, part, working_px=options.working_px)
-    bank = bank_of(pyramid, placed, window)
-    seen = part_on_window(part, window)
-    stack = gather(bank, seen, most=options.sources)
+    window = window_of(filled, placed, part, working_px=options.working_px)
+    stack = gather(window, window.hole, window.views[0], most=options.sources)
     if stack is None:
         return "untaught"
     training = begun(seed=options.seed, device=turn.device)
@@ -119,7 +113,7 @@ def _change(
         now = time.monotonic()
         stop = None if turn.until is None else now + (turn.until - now) / 3
         learned, judged = lessons(
-            bank, seen, count=options.examples, most=options.sources, seed=options.seed, until=stop
+            window, count=options.examples, most=options.sources, seed=options.seed, until=stop
         )
         if not learned:
             return "untaught"
@@ -138,11 +132,25 @@ def _change(
         return "useless"
     training.mean.load_state_dict(training.best_weights)
     batch = batch_of([stack], device=turn.device)
-    before = _composed(bank, stack, plain(batch), part)
-    after = _composed(bank, stack, painted_all_ways(training.mean, batch), part)
+    ground, found = Ground.of(filled.pixels, filled.valid), [window.on_photo(one) for one in stack.found]
+    points = np.argwhere(part)[:, ::-1].astype(float)
+    at, _ = project(np.linalg.inv(window.views[0]) @ window.from_photo, points)
+
+    def composed(said: Painted) -> Floats:
+        """What was said on the window's pixels, as colours [L, 3] of the photo's.
+
+        Attention, membranes and correction are smooth enough to be magnified; the sources are read anew, so
+        that detail finer than the window's is kept. Where none shows the ground there is nothing to tell of.
+        """
+        attention = np.stack([taken(plane, at) for plane in said.attention[0, :, 0].cpu().numpy()])
+        smooth = (said.fill - (said.attention * batch.sources).sum(1))[0].movedim(0, -1).cpu().numpy()
+        colours, weight = mixed(points, ground, found, attention, sharp=True)
+        return np.where((weight > 1e-2)[:, None], colours + taken(np.ascontiguousarray(smooth), at), 0)
+
+    before, after = composed(plain(batch)), composed(painted_all_ways(training.mean, batch))
     # A correction of one mean of the sources is no correction of another: where the stack's fill is farther
     # from the mean that the network started from than this was wrong on other cells, less of it is taken.
-    apart = float(np.abs(np.clip(before, 0, 1) - filled).mean())
+    apart = float(np.abs(np.clip(before, 0, 1) - filled.pixels[part]).mean())
     trust = _TAKEN * training.best_share * min(1.0, training.best_error / max(apart, 1e-6))
     return (trust * (after - before)).astype(np.float32)
 
@@ -156,47 +164,3 @@ def _device(name: str) -> torch.device:
     except (RuntimeError, AssertionError) as error:
         raise UsageError(f"there is no device {name!r} to train on: say cpu or auto ({error})") from None
     return device
-
-
-def part_on_window(part: np.ndarray, window: Window) -> np.ndarray:
-    """The hole on the window's pixels: all that it touches."""
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    wide = part.astype(np.float32)
-    if window.scale < 1:
-        reach = 2 * int(np.ceil(0.5 / window.scale)) + 1
-        wide = cv2.dilate(wide, np.ones((reach, reach), np.uint8))
-    return (
-        cv2.warpPerspective(wide, window.photo_from_window, (window.width, window.height), flags=flags) > 0.01
-    )
-
-
-def _composed(bank: Bank, stack: Stack, said: Painted, part: np.ndarray) -> np.ndarray:
-    """The colours [L, 3] of one part's pixels, at the photo's size, from what was said on the window's.
-
-    Attention, strength, membranes and correction are smooth enough to be magnified; the sources are read
-    anew, so that detail finer than the window's is kept.
-    """
-    window = bank.window
-    rows, columns = np.nonzero(part)
-    places = project(np.linalg.inv(window.photo_from_window), np.stack([columns, rows], 1).astype(float))
-    core = (places - [window.core[1].start, window.core[0].start]).astype(np.float32)
-
-    def magnified(planes: np.ndarray) -> np.ndarray:
-        """[C, h, w] read at the hole's pixels: [L, C]."""
-        return np.stack([taken(np.ascontiguousarray(plane), core) for plane in planes], axis=1)
-
-    attention = magnified(said.attention[0, :, 0].cpu().numpy())
-    strength = magnified(said.strength[0].cpu().numpy())
-    total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
-    for source, matrix in enumerate(stack.matrices):
-        points = project(matrix, places)
-        step = step_px(matrix, window) * window.scale
-        colours = bank.pyramid.read(points, step_px=step, cubic=True)
-        colours = colours * stack.gains[source] + stack.offsets[source]
-        colours = colours + strength * magnified(np.moveaxis(stack.lifts[source], -1, 0))
-        share = attention[:, source] * bank.pyramid.read_known(points)
-        total += share[:, None] * colours
-        weight += share
-    filled = total / np.maximum(weight, 1e-4)[:, None] + magnified(said.correction[0].cpu().numpy())
-    # Where no source shows the ground there is nothing to tell of.
-    return np.where((weight > 1e-2)[:, None], filled, 0)

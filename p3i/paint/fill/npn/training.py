@@ -14,9 +14,9 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from p3i.paint.fill.npn.gather import Stack
 from p3i.paint.fill.npn.lessons import batch_of, varied
 from p3i.paint.fill.npn.network import Batch, PaintingNetwork, PatchDiscriminator, plain
+from p3i.paint.fill.npn.window import Stack
 
 Progress = Callable[[int, int, float], None]
 """Told of step, of how many, and the mean L1 (0..255) over the latest holes."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from painted import Scene, bank, scene, stacks
+from painted import Scene, scene, stacks, window
 
 from p3i.errors import FileError, UsageError
 from p3i.options.npn import NetworkOptions
@@ -103,8 +103,7 @@ def test_training_learns_and_beats_a_plain_mean_of_the_cells(photo: Scene) -> No
 
 
 def test_targets_of_lessons_are_known_and_their_holes_hidden_in_the_sources(photo: Scene) -> None:
-    windows, hole = bank(photo)
-    learned, judged = lessons(windows, hole, count=12, most=5, seed=1)
+    learned, judged = lessons(window(photo), count=12, most=5, seed=1)
     assert learned and judged
     for stack in learned + judged:
         assert not (stack.hole & stack.context).any()
