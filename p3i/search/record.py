@@ -40,6 +40,8 @@ def answer_record(result: SynthesisResult, *, image: str, seconds: float) -> dic
     }
     if result.lens_k1 is not None:
         record["camera"]["lens_k1"] = result.lens_k1
+    if result.pose_sigma_deg is not None:
+        record["camera"]["pose_sigma_deg"] = result.pose_sigma_deg
     if result.mirrored is not None:
         record["camera"]["mirrored"] = list(result.mirrored)
     if len(result.candidates) > 1:

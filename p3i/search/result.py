@@ -70,6 +70,8 @@ class SynthesisResult:
     `lens_k1` is the radial distortion of the photo that `program` holds on (docs/geometry.md), None where it
     was seen as a pinhole camera's; `centers` lie on the photo as it is. `region` is the part of the photo
     where the program holds: a convex polygon around the cells of its objects, (x, y) in pixels.
+    `pose_sigma_deg` is how well the tilt is known, in degrees: the standard deviation of the angle of the
+    plane's normal; None without a program.
     `mirrored` is the other tilt, (rx, ry) in degrees, that a ring's objects fit about as well, None where the
     two can be told apart.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
@@ -90,6 +92,7 @@ class SynthesisResult:
     region: tuple[tuple[float, float], ...] = ()
     features: str = ""
     seed: int = 0
+    pose_sigma_deg: float | None = None
     mirrored: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 

@@ -22,6 +22,7 @@ from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.lens import find_with_lens
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
+from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
 from p3i.search.result import (
     FOCAL_REASONS,
     Candidate,
@@ -108,7 +109,10 @@ def _result(
     runner_up = max((answer.worth for answer in good[1:]), default=0.0)
     margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(session, first)
-    notes = first.notes if other is None else (*first.notes, ambiguity_note(other))
+    sigma_deg = pose_sigma_deg(session.evidence, first)
+    doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
+    ambiguity = None if other is None else ambiguity_note(other)
+    notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
     if config.extent_used == "image" and first.structure != "lattice":
         notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
     if session.unwritable - {first.structure}:
@@ -136,6 +140,7 @@ def _result(
         centers=centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         lens_k1=first.lens_k1,
+        pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
         notes=notes,
         **_focal_facts(first, assumed),
