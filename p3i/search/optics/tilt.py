@@ -39,8 +39,8 @@ _FOCAL_SPREAD, _MOST_ZOOM = 0.35, 0.15
 _NOISE_VARIANCE, _NOISE_COUNTS = 0.25, 4.0
 _ROUNDS = 3
 _MOST_ALIKE = 0.9
-# Residuals beyond so many of their own scale count less and less.
-_ROBUST_SCALE = 2.0
+# Residuals beyond so many of their own scale count less and less; of plain noise this is the mean weight.
+_ROBUST_SCALE, _PLAIN_WEIGHT = 2.0, 0.723
 
 
 def pose_sigma_deg(evidence: Evidence, answer: Answer) -> float | None:
@@ -170,7 +170,7 @@ def covariance_of(
         return _inverse(normal + prior) * limits * limits[:, None]
     rows, residual, weights = rows[seen], residual[seen], weights[seen]
     fit = _fitted(rows, residual, weights=weights / weights.mean(), prior=prior)
-    normal = torch.einsum("nip,n,niq->pq", rows, fit.weights, rows) * each
+    normal = torch.einsum("nip,n,niq->pq", rows, fit.weights, rows) * each / _PLAIN_WEIGHT
     alike = _alike(points[seen], fit.left * fit.weights.sqrt()[:, None]) ** (each ** (-1 / directions))
     variance = fit.variance * ((1 + alike) / (1 - alike)) ** directions
     covariance = _inverse(normal / variance + prior) + fit.step[:, None] * fit.step
@@ -222,7 +222,9 @@ def _alike(points: Tensor, left: Tensor) -> float:
     """
     apart = torch.cdist(points, points).fill_diagonal_(torch.inf)
     shared = float((left * left[apart.argmin(1)]).sum() / left.square().sum().clamp(min=1e-12))
-    return min(max(shared, 0.0), _MOST_ALIKE)
+    # By chance they share 0, give or take the root of 1 / N; less than that is nothing.
+    chance = 1 / math.sqrt(len(points))
+    return 0.0 if shared <= chance else min(shared * (1 - (chance / shared) ** 2), _MOST_ALIKE)
 
 
 def _inverse(normal: Tensor) -> Tensor:
