@@ -38,6 +38,7 @@ class StopReason(Enum):
     INTERRUPTED = "interrupted before the search had ended"
     NO_PATTERN = "no regular pattern"
     COSTS_MORE = "no regular pattern: what repeats is less than the program takes to write"
+    OUT_OF_SIGHT = "no regular pattern: most objects of what was found would lie outside the picture"
     NO_FIT = "the sketch does not fit this photo"
     OUTSIDE_TABLE_1 = "the pattern that was found cannot be written in the paper's Table 1, as strict asks"
     TOO_SMALL = "the picture is too small to hold a pattern"

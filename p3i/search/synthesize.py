@@ -15,7 +15,7 @@ from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
 from p3i.search.judge.bits import by_explained
 from p3i.search.judge.evaluate import score_of_program
-from p3i.search.judge.region import centers_px, region_px
+from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
@@ -41,6 +41,8 @@ _LEAST_KNOWN = 0.1
 _LEAST_SPREAD = 0.004
 # Where a family has an answer of this score, no other kind of pattern could explain the photo better.
 _BEYOND_DOUBT = 0.3
+# A curve of which the photo shows less than this share was not seen.
+_LEAST_IN_SIGHT = 0.5
 
 
 def synthesize(
@@ -95,10 +97,12 @@ def _result(
         if before.score >= needed and (fills or after.score >= needed)
     ]
     # What a person asked for is theirs to choose, whatever it costs.
-    good = sure if asked_for(config) is not None else [answer for answer in sure if answer.worth > 0]
+    asked = asked_for(config) is not None
+    seen = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
+    good = seen if asked else [answer for answer in seen if answer.worth > 0]
     if not good:
         best = max((answer.score for answer in told), default=0.0)
-        reason = StopReason.COSTS_MORE if sure else why_not(config)
+        reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
         if session.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
         refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
@@ -223,6 +227,18 @@ def _with_printed_score(session: Session, answer: Answer, needed: float) -> Answ
         session.evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1
     )
     return replace(answer, score=score)
+
+
+def _in_sight(session: Session, answer: Answer) -> bool:
+    """Whether the photo shows at least half of the objects of a curve, which it would be the evidence of.
+
+    The box of indices of a lattice that stands askew to the frame has half of its corners outside.
+    """
+    if answer.structure == "lattice":
+        return True
+    focal_mm = answer.focal_mm or session.evidence.focal_mm
+    shown = share_in_sight(answer.program, session.evidence.image, focal_mm, lens_k1=answer.lens_k1)
+    return shown >= _LEAST_IN_SIGHT
 
 
 def _mirrored(session: Session, answer: Answer) -> Camera | None:
