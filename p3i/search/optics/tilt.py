@@ -38,7 +38,7 @@ _FOCAL_SPREAD, _MOST_ZOOM = 0.35, 0.15
 # Before any residual is seen, places stray half as far as `whitening` says; that counts as so many residuals.
 _NOISE_VARIANCE, _NOISE_COUNTS = 0.25, 4.0
 _ROUNDS = 3
-_MOST_ALIKE = 0.9
+_MOST_ALIKE = 0.6
 # Residuals beyond so many of their own scale count less and less; of plain noise this is the mean weight.
 _ROBUST_SCALE, _PLAIN_WEIGHT = 2.0, 0.723
 
