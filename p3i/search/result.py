@@ -39,6 +39,7 @@ class StopReason(Enum):
     INTERRUPTED = "interrupted before the search had ended"
     NO_PATTERN = "no regular pattern"
     COSTS_MORE = "no regular pattern: what repeats is less than the program takes to write"
+    OUT_OF_SIGHT = "no regular pattern: most objects of what was found would lie outside the picture"
     NO_FIT = "the sketch does not fit this photo"
     OUTSIDE_TABLE_1 = "the pattern that was found cannot be written in the paper's Table 1, as strict asks"
     TOO_SMALL = "the picture is too small to hold a pattern"
@@ -80,6 +81,8 @@ class SynthesisResult:
     `lens_k1` is the radial distortion of the photo that `program` holds on (docs/geometry.md), None where it
     was seen as a pinhole camera's; `centers` lie on the photo as it is. `region` is the part of the photo
     where the program holds: a convex polygon around the cells of its objects, (x, y) in pixels.
+    `pose_sigma_deg` is how well the tilt is known, in degrees: the standard deviation of the angle of the
+    plane's normal; None without a program.
     `mirrored` is the other tilt, (rx, ry) in degrees, that a ring's objects fit about as well, None where the
     two can be told apart.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
@@ -100,6 +103,7 @@ class SynthesisResult:
     region: tuple[tuple[float, float], ...] = ()
     features: str = ""
     seed: int = 0
+    pose_sigma_deg: float | None = None
     mirrored: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 
@@ -137,6 +141,8 @@ class SynthesisResult:
             camera["lens_k1"] = self.lens_k1
         if self.mirrored is not None:
             camera["mirrored"] = list(self.mirrored)
+        if self.pose_sigma_deg is not None:
+            camera["pose_sigma_deg"] = self.pose_sigma_deg
         record: dict[str, Any] = {
             "image": image,
             "width": width,

@@ -15,13 +15,14 @@ from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
 from p3i.search.judge.bits import by_explained
 from p3i.search.judge.evaluate import score_of_program
-from p3i.search.judge.region import centers_px, region_px
+from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.lens import find_with_lens
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
+from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
 from p3i.search.result import (
     FOCAL_REASONS,
     Candidate,
@@ -40,6 +41,8 @@ _LEAST_KNOWN = 0.1
 _LEAST_SPREAD = 0.004
 # Where a family has an answer of this score, no other kind of pattern could explain the photo better.
 _BEYOND_DOUBT = 0.3
+# A curve of which the photo shows less than this share was not seen.
+_LEAST_IN_SIGHT = 0.5
 
 
 def synthesize(
@@ -94,10 +97,12 @@ def _result(
         if before.score >= needed and (fills or after.score >= needed)
     ]
     # What a person asked for is theirs to choose, whatever it costs.
-    good = sure if asked_for(config) is not None else [answer for answer in sure if answer.worth > 0]
+    asked = asked_for(config) is not None
+    seen = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
+    good = seen if asked else [answer for answer in seen if answer.worth > 0]
     if not good:
         best = max((answer.score for answer in told), default=0.0)
-        reason = StopReason.COSTS_MORE if sure else why_not(config)
+        reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
         if session.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
         refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
@@ -108,7 +113,10 @@ def _result(
     runner_up = max((answer.worth for answer in good[1:]), default=0.0)
     margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(session, first)
-    notes = first.notes if other is None else (*first.notes, ambiguity_note(other))
+    sigma_deg = pose_sigma_deg(session.evidence, first)
+    doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
+    ambiguity = None if other is None else ambiguity_note(other)
+    notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
     if config.extent_used == "image" and first.structure != "lattice":
         notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
     if session.unwritable - {first.structure}:
@@ -136,6 +144,7 @@ def _result(
         centers=centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         lens_k1=first.lens_k1,
+        pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
         notes=notes,
         **_focal_facts(first, assumed),
@@ -218,6 +227,18 @@ def _with_printed_score(session: Session, answer: Answer, needed: float) -> Answ
         session.evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1
     )
     return replace(answer, score=score)
+
+
+def _in_sight(session: Session, answer: Answer) -> bool:
+    """Whether the photo shows at least half of the objects of a curve, which it would be the evidence of.
+
+    The box of indices of a lattice that stands askew to the frame has half of its corners outside.
+    """
+    if answer.structure == "lattice":
+        return True
+    focal_mm = answer.focal_mm or session.evidence.focal_mm
+    shown = share_in_sight(answer.program, session.evidence.image, focal_mm, lens_k1=answer.lens_k1)
+    return shown >= _LEAST_IN_SIGHT
 
 
 def _mirrored(session: Session, answer: Answer) -> Camera | None:

@@ -38,3 +38,9 @@ def test_a_record_tells_of_a_lens_and_of_the_other_tilt_only_where_there_is_one(
     assert "mirrored" not in camera and "lens_k1" not in camera
     camera = open_tilt.record(image="a.jpg", seconds=1.0)["camera"]
     assert camera["mirrored"] == [12.5, -3.25] and camera["lens_k1"] == -0.0312
+
+
+def test_a_record_tells_how_well_the_tilt_is_known() -> None:
+    program = Program(CameraPose(), Draw(x=Affine(), y=Affine()), header=Header(canvas=(40, 30)))
+    result = SynthesisResult(program=program, stop=StopReason.FOUND, pose_sigma_deg=0.217)
+    assert result.record(image="a.jpg", seconds=1.0)["camera"]["pose_sigma_deg"] == 0.217

@@ -229,6 +229,39 @@ def test_a_ring_that_leaves_its_tilt_open_says_so(
     assert any("mirrored" in note for note in result.notes) == told
 
 
+@pytest.mark.parametrize(("center", "shown"), [((0.0, 0.0), True), ((-46.0, -36.0), False)])
+def test_a_ring_most_of_which_lies_outside_the_picture_is_no_answer(
+    monkeypatch: pytest.MonkeyPatch, center: tuple[float, float], shown: bool
+) -> None:
+    """A corner of the picture holds 4 of its 12 objects, which agree as well as ever."""
+    ring = DrawnRing(center=center, rx_deg=0, ry_deg=0)
+    (x, y), angle = center, "30*j + 20"
+    answered_by(
+        monkeypatch, f"for j in range(0, 12):\n    Draw(x=24*Cos({angle}) + {x}, y=24*Sin({angle}) + {y})\n"
+    )
+    monkeypatch.setattr(synthesize_module, "score_of_program", lambda *_, **__: 0.9)
+    result = synthesize(ring.image(), SearchConfig())
+    assert (result.program is not None) == shown
+    assert result.stop is (StopReason.FOUND if shown else StopReason.OUT_OF_SIGHT)
+
+
+@pytest.mark.parametrize(("radius", "rx", "open_tilt"), [(6, 0, True), (24, -30, False)])
+def test_an_answer_says_how_well_its_tilt_is_known(
+    monkeypatch: pytest.MonkeyPatch, radius: float, rx: float, open_tilt: bool
+) -> None:
+    count = 6 if open_tilt else 12
+    nudges = {number: (0.1 * (-1) ** number, 0.05 * (number % 3)) for number in range(count)}
+    ring = DrawnRing(count, count, center=(0, 0), radius=radius, size=3, rx_deg=rx, ry_deg=0, nudges=nudges)
+    angle = f"{360 // count}*j + 20"
+    x, y = f"{radius}*Cos({angle})", f"{radius}*Sin({angle})"
+    text = f"SetCameraPose(rx={rx}, ry=0)\nfor j in range(0, {count}):\n    Draw(x={x}, y={y})\n"
+    answered_by(monkeypatch, text)
+    result = synthesize(ring.image(), SearchConfig())
+    assert result.program is not None and result.pose_sigma_deg is not None
+    assert (result.pose_sigma_deg > 3) == open_tilt
+    assert sum("degrees only" in note for note in result.notes) == open_tilt
+
+
 def test_progress_tells_what_is_done_and_never_goes_back() -> None:
     told: list[tuple[str, float]] = []
     steps: list[Mapping[str, Any]] = []

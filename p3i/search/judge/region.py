@@ -32,6 +32,12 @@ def centers_px(
     )
 
 
+def share_in_sight(program: Program, image: Image, focal_mm: float, *, lens_k1: float | None = None) -> float:
+    """The share of the program's objects that the photo shows, 0 to 1; draws that coincide are one object."""
+    drawn = len(unroll.distinct(unroll.points(program)))
+    return len(centers_px(program, image, focal_mm, lens_k1=lens_k1)) / max(drawn, 1)
+
+
 def region_px(
     program: Program, image: Image, focal_mm: float, *, lens_k1: float | None = None
 ) -> tuple[tuple[float, float], ...]:
