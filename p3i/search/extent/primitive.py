@@ -61,19 +61,25 @@ class _Ground:
     index: Tensor
 
 
-def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> tuple[Tensor, Tensor] | None:
-    """The primitive cell on the ground of `fit`: theta [P] and cells [N, 2]; None where it is its own."""
-    support = fit.index[fit.support]
-    if len(support) < _FEWEST:
-        return None
-    first = found = _Ground(fit.theta, support)
-    for _ in range(3):  # each turn divides the cell by 2 to 4
-        finer = _finer(evidence, pattern, found)
-        if finer is None:
-            break
-        found = finer
-    found = _coarser(evidence, pattern, found) or found
-    return None if found is first else (found.theta, found.index)
+def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tensor, Tensor]]:
+    """The cells that the ground of `fit` may have, each as theta [P] and cells [N, 2]: one, or two.
+
+    Two where alternate cells differ: a chequered floor's do because its period is the double, a crossword's or
+    a letter board's because black and coloured fields fall on them unevenly. The doubled cell comes first;
+    which of them it is the score of the finished program tells. With too few cells, that of the fit.
+    """
+    found = _Ground(fit.theta, fit.index[fit.support])
+    if len(found.index) >= _FEWEST:
+        for _ in range(3):  # each turn divides the cell by 2 to 4
+            finer = _finer(evidence, pattern, found)
+            if finer is None:
+                break
+            found = finer
+    both = [found]
+    if len(found.index) >= _FEWEST:
+        coarser = _coarser(evidence, pattern, found)
+        both = [found] if coarser is None else [coarser, found]
+    return [(one.theta, one.index) for one in both]
 
 
 def _finer(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground | None:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from p3i.search.forms.lattice import reduce_basis
+
 # Shifts at which less than this share of the view (or of its energy) overlaps itself are not judged.
 _LEAST_OVERLAP = 0.15
 # A peak lower than this is not worth a look.
@@ -19,6 +21,19 @@ _PEAKS = 14
 _LEAST_SINE = 0.35
 # The smallest cell among the pairs within this share of the best pair wins.
 _NEARLY_BEST = 0.8
+# Rows in halves and thirds of a basis: the lattices of which it spans every second or third point.
+_FINER = (
+    [[0.5, 0], [0, 1]],
+    [[1, 0], [0, 0.5]],
+    [[0.5, 0.5], [0.5, -0.5]],
+    [[1 / 3, 0], [0, 1]],
+    [[1, 0], [0, 1 / 3]],
+    [[1 / 3, 1 / 3], [0, 1]],
+    [[1 / 3, -1 / 3], [0, 1]],
+)
+_MOST_DIVISIONS = 3
+# A step of fewer pixels of the view leaves no valley to see: two samples a period.
+_SHORTEST_PART = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +115,37 @@ def best_pair(found: Autocorrelation, *, least: float, most: float) -> ShiftPair
     score = 0.6 * np.minimum(worth[first], worth[second]) + 0.4 * diagonals.clip(0).mean(0)
     nearly = np.flatnonzero(score >= _NEARLY_BEST * score.max())
     best = nearly[np.argmin(area[nearly])]
-    return ShiftPair(np.stack([u[best], v[best]]), float(score[best]))
+    basis = _divided(found, np.stack([u[best], v[best]]))
+    return ShiftPair(basis, float(score[best]))
+
+
+def _divided(found: Autocorrelation, basis: np.ndarray) -> np.ndarray:
+    """The finest lattice [2, 2] that holds `basis` and at whose further shifts the view is as alike.
+
+    Along a row of ruled lines the view stays alike on the way to the next field, so the step has a shallow
+    valley and a diagonal wins; but what repeats at the diagonal repeats at the step, and a true part shows it.
+    """
+    for _ in range(_MOST_DIVISIONS):
+        needed = _NEARLY_BEST * _values_at(found, basis).min()
+        finer = None
+        for rows in _FINER:
+            parts = _with_sums(np.array(rows) @ basis)
+            alike = _values_at(found, parts).min()
+            short = np.hypot(*parts.T).min() < _SHORTEST_PART
+            if short or alike < needed or valley_contrast(found, parts).min() < _LEAST_PEAK:
+                continue
+            if finer is None or alike > finer[0]:
+                finer = alike, parts[:2]
+        if finer is None:
+            break
+        basis = finer[1]
+    return basis
+
+
+def _with_sums(basis: np.ndarray) -> np.ndarray:
+    """The two shifts of a reduced basis, their sum and their difference: [4, 2]."""
+    u, v = reduce_basis(basis)
+    return np.stack([u, v, u + v, u - v])
 
 
 def valley_contrast(found: Autocorrelation, shifts: np.ndarray) -> np.ndarray:
@@ -113,6 +158,19 @@ def valley_contrast(found: Autocorrelation, shifts: np.ndarray) -> np.ndarray:
         found.values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=-1
     )
     return on_the_way[:, -1] - on_the_way.min(1)
+
+
+def _values_at(found: Autocorrelation, shifts: np.ndarray) -> np.ndarray:
+    """The value at each shift [N, 2], between pixels in proportion, [N]."""
+    at = (found.values.shape[0] // 2 + shifts).astype(np.float32)
+    return cv2.remap(
+        found.values,
+        at[:, :1],
+        at[:, 1:],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=-1,
+    )[:, 0]
 
 
 def _peaks(found: Autocorrelation, *, least: float, most: float) -> tuple[np.ndarray, np.ndarray]:
