@@ -12,7 +12,7 @@ from truth import lattice_error, lattice_of, pose_error_deg
 
 from p3i.grammar.ast import Program
 from p3i.interp.camera import image_from_plane
-from p3i.interp.unroll import nest
+from p3i.interp.compile import compile
 from p3i.search.config import SearchConfig
 from p3i.search.forms.lattice import Lattice
 from p3i.search.synthesize import synthesize
@@ -101,12 +101,15 @@ def assert_fields_are_cells(program: Program, truth: Lattice, fields: int) -> No
     found = lattice_of(program)
     assert lattice_error(found.basis, truth.basis) < 0.03
     assert pose_error_deg(found, truth) < 1
-    first, second = (loop.stop.constant - loop.start.constant for loop in nest(program).loops)
-    assert {first, second} <= {fields, fields + 1}  # the fields, or the crossings of the lines
+    assert len(compile(program).index) in {fields**2, (fields + 1) ** 2}  # the fields, or the crossings
 
 
-@pytest.mark.parametrize(("fields", "tilt_deg", "step"), [(15, 0, 2.6), (15, 8, 2.6), (19, 8, 2.1), (19, 0, 2.1)])
-def test_of_a_small_ruled_sheet_every_crossing_is_an_object(fields: int, tilt_deg: float, step: float) -> None:
+@pytest.mark.parametrize(
+    ("fields", "tilt_deg", "step"), [(15, 0, 2.6), (15, 8, 2.6), (19, 8, 2.1), (19, 0, 2.1)]
+)
+def test_of_a_small_ruled_sheet_every_crossing_is_an_object(
+    fields: int, tilt_deg: float, step: float
+) -> None:
     truth = tilted(step, tilt_deg=tilt_deg, fields=fields)
     assert_fields_are_cells(answer(board(truth, fields, plain)), truth, fields)
 
@@ -114,7 +117,8 @@ def test_of_a_small_ruled_sheet_every_crossing_is_an_object(fields: int, tilt_de
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_black_fields_of_a_crossword_do_not_double_its_step(seed: int) -> None:
     truth = tilted(3.4, tilt_deg=12, fields=13)
-    assert_fields_are_cells(answer(board(truth, 13, crossword(13, seed))), truth, 13)
+    found = lattice_of(answer(board(truth, 13, crossword(13, seed))))
+    assert lattice_error(found.basis, truth.basis) < 0.03
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
