@@ -1,6 +1,7 @@
 """Lattices on a photo: proposals, growth, the primitive cell, phase and extent, in this order."""
 
 import numpy as np
+from torch import Tensor
 
 from p3i.interp.pattern import Pattern
 from p3i.search.answer import Answer
@@ -139,20 +140,24 @@ def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
     )
     if last is None or int(last.support.sum()) < _LEAST_CELLS:
         return None
-    cells = [(last.theta, last.index[last.support])]
-    other = primitive(evidence, pattern, last)
-    if other is not None:
-        cells.insert(0, other)
+    readings = primitive(evidence, pattern, last)
+    best = _best_of(session, pattern, readings)
+    if (best is None or best.score < NEEDED) and all(theta is not last.theta for theta, _ in readings):
+        own = _best_of(session, pattern, [(last.theta, last.index[last.support])])
+        best = max((one for one in (best, own) if one is not None), key=lambda one: one.score, default=None)
+    return best
+
+
+def _best_of(session: Session, pattern: Pattern, readings: list[tuple[Tensor, Tensor]]) -> Answer | None:
+    """Of one ground's cells (theta [P], index [N, 2]), finished each, the program with the best score."""
     best: Answer | None = None
-    for theta, ground in cells:
-        layout = found_layout(evidence, Lattice.of(pattern, theta), ground)
+    for theta, ground in readings:
+        layout = found_layout(session.evidence, Lattice.of(pattern, theta), ground)
         if layout is None:
             continue
-        answer = _answer(session, pattern, refitted(evidence, pattern, layout))
+        answer = _answer(session, pattern, refitted(session.evidence, pattern, layout))
         if answer is not None and (best is None or answer.score > best.score):
             best = answer
-        if best is not None and best.score >= NEEDED:
-            break
     return best
 
 

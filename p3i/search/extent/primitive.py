@@ -4,7 +4,8 @@ A search that compares a picture with its shifted self cannot tell a period from
 that are blind to black and white take a chessboard's square for its cell. So, with the camera as found, a
 lattice and its sublattices are told apart by whether the cosets look the same: a finer lattice is taken
 where the cells that it adds look like those that were there, a coarser one where every second cell looks
-different. Looks are compared both in the search's features and in colour.
+different. Looks are compared both in the search's features and in colour. Where fields are of several kinds
+without a rule, the kinds are never spread evenly: there the finer lattice is handed on beside the coarser.
 """
 
 from dataclasses import dataclass
@@ -61,19 +62,24 @@ class _Ground:
     index: Tensor
 
 
-def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> tuple[Tensor, Tensor] | None:
-    """The primitive cell on the ground of `fit`: theta [P] and cells [N, 2]; None where it is its own."""
-    support = fit.index[fit.support]
-    if len(support) < _FEWEST:
-        return None
-    first = found = _Ground(fit.theta, support)
+def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tensor, Tensor]]:
+    """The cells that the ground of `fit` may have, each as theta [P] and cells [N, 2]: one, or two.
+
+    Two where alternate cells differ, the doubled cell first: a chequered floor's differ because that is its
+    period, a crossword's or a letter board's because black and coloured fields fall on them unevenly. Only
+    the scores of the finished programs tell which it is. With too few cells the fit's own is the only one.
+    """
+    found = _Ground(fit.theta, fit.index[fit.support])
+    if len(found.index) < _FEWEST:
+        return [(found.theta, found.index)]
     for _ in range(3):  # each turn divides the cell by 2 to 4
         finer = _finer(evidence, pattern, found)
         if finer is None:
             break
         found = finer
-    found = _coarser(evidence, pattern, found) or found
-    return None if found is first else (found.theta, found.index)
+    coarser = _coarser(evidence, pattern, found)
+    both = [found] if coarser is None else [coarser, found]
+    return [(one.theta, one.index) for one in both]
 
 
 def _finer(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground | None:

@@ -29,6 +29,8 @@ _CHANNELS = 4
 # Shortest and longest shift, in pixels of the canvas.
 _SHIFTS = (4.0, 60.0)
 _WINDOW = 128
+# Parts of a lattice may be shorter than what begins one, down to two pixels, the least that shows a valley.
+_LEAST_PART = 2.0
 
 
 def straightened_proposals(evidence: Evidence) -> list[Proposal]:
@@ -41,7 +43,9 @@ def straightened_proposals(evidence: Evidence) -> list[Proposal]:
         if view is None:
             continue
         features, weights, unit, middle = view
-        pair = best_pair(autocorrelation(features, weights), least=_SHIFTS[0], most=_SHIFTS[1])
+        pair = best_pair(
+            autocorrelation(features, weights), least=_SHIFTS[0], most=_SHIFTS[1], least_part=_LEAST_PART
+        )
         if pair is not None:
             lattice = Lattice(rx_deg, ry_deg, reduce_basis(pair.basis * unit), middle)
             found.append(Proposal(lattice, pair.worth, local=False))
@@ -70,6 +74,7 @@ def window_proposals(evidence: Evidence) -> list[Proposal]:
                 autocorrelation(view, (weights * round_window).astype(np.float32)),
                 least=5.0,
                 most=0.5 * side,
+                least_part=_LEAST_PART,
             )
             if pair is None:
                 continue

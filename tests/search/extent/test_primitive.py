@@ -34,9 +34,7 @@ def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]])
     steps = ground.index.numpy() @ factors
     inside = torch.from_numpy(((steps > own.min(0)) & (steps < own.max(0))).all(1))
     ground = Fit(ground.theta, ground.index[inside], ground.contrast[inside], ground.score)
-    found = primitive(evidence_of(scene), PATTERN, ground)
-    assert found is not None
-    theta, index = found
+    theta, index = primitive(evidence_of(scene), PATTERN, ground)[-1]
     assert lattice_error(Lattice.of(PATTERN, theta).basis, truth.basis) < 1e-6
     # The new cells lie on the ground of the old ones, all of it.
     determinant = abs(np.linalg.det(factors))
@@ -52,7 +50,8 @@ def test_the_true_cell_is_its_own(seed: int) -> None:
     theta = lattice.reduced().theta(PATTERN)
     fit = measure(evidence.level_for(side_of_cell(evidence, PATTERN, theta)), PATTERN, theta)
     assert fit is not None and int(fit.support.sum()) > 10
-    assert primitive(evidence, PATTERN, fit) is None
+    [(found, index)] = primitive(evidence, PATTERN, fit)
+    assert torch.equal(found, theta) and torch.equal(index, fit.index[fit.support])
 
 
 SIDE = 6.0
@@ -79,9 +78,8 @@ def chequered_floor() -> tuple[Evidence, Lattice]:
 
 def test_a_square_of_a_chequered_floor_is_half_a_cell() -> None:
     evidence, squares = chequered_floor()
-    found = primitive(evidence, PATTERN, fit_of(evidence, squares))
-    assert found is not None
-    theta, index = found
+    (theta, index), (single, _) = primitive(evidence, PATTERN, fit_of(evidence, squares))
+    assert lattice_error(Lattice.of(PATTERN, single).basis, squares.basis) < 1e-6  # left to the score
     full = np.array([[1, 1], [1, -1]]) @ squares.basis
     assert lattice_error(Lattice.of(PATTERN, theta).basis, full) < 1e-6
     # Every second square is left: the ones of one colour, counted in the new steps.
@@ -92,16 +90,16 @@ def test_a_square_of_a_chequered_floor_is_half_a_cell() -> None:
 def test_the_full_cell_of_a_chequered_floor_stays() -> None:
     evidence, squares = chequered_floor()
     full = squares.with_basis(np.array([[1.0, 1.0], [-1.0, 1.0]]) @ squares.basis)
-    found = primitive(evidence, PATTERN, fit_of(evidence, full))
-    basis = full.basis if found is None else Lattice.of(PATTERN, found[0]).basis
-    assert lattice_error(basis, full.basis) < 1e-6
+    [(theta, _)] = primitive(evidence, PATTERN, fit_of(evidence, full))
+    assert lattice_error(Lattice.of(PATTERN, theta).basis, full.basis) < 1e-6
 
 
 def test_too_few_cells_say_nothing() -> None:
     scene = small_scene(16)
     fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
     few = Fit(fit.theta, fit.index[:3], fit.contrast[:3], fit.score)
-    assert primitive(evidence_of(scene), PATTERN, few) is None
+    [(theta, index)] = primitive(evidence_of(scene), PATTERN, few)
+    assert torch.equal(theta, few.theta) and len(index) == 3
 
 
 def test_cells_of_a_single_coset_tell_nothing_apart() -> None:

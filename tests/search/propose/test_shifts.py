@@ -125,3 +125,35 @@ def test_a_shift_is_worth_what_it_rises_above_the_valley_before_it() -> None:
     found = autocorrelation(waves, np.ones((96, 96), np.float32))
     shifts = np.array([[12.0, 0.0], [6.0, 0.0], [0.0, 12.0]])
     np.testing.assert_allclose(valley_contrast(found, shifts), [2, 0, 0], atol=0.1)
+
+
+def ruled(step: float, turn_deg: float, *, differing: float = 0.0, side: int = 128) -> np.ndarray:
+    """Lines about square fields, [S, S, 2]; they stand out by 1 + or - `differing`, in chequers."""
+    y, x = np.mgrid[0:side, 0:side] - side / 2
+    turn = np.radians(turn_deg)
+    at = np.stack([x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)], -1) / step + 0.3
+    away = (at - np.round(at)) * step
+    lines = np.exp(-(away**2) / (2 * 0.7**2))
+    kind = np.where(np.floor(at).sum(-1) % 2 == 0, 1 + differing, 1 - differing)
+    view = (lines * kind[..., None]).astype(np.float32)
+    return view - cv2.GaussianBlur(view, (0, 0), step)
+
+
+@pytest.mark.parametrize("step", [6.0, 9.0, 13.0])
+@pytest.mark.parametrize("turn_deg", [0.0, 4.0, 30.0])
+def test_the_pair_of_a_ruled_sheet_is_its_step_and_not_its_diagonal(step: float, turn_deg: float) -> None:
+    pair = best_pair(
+        autocorrelation(ruled(step, turn_deg), np.ones((128, 128), np.float32)), least=4, most=60
+    )
+    assert pair is not None
+    np.testing.assert_allclose(np.linalg.norm(reduce_basis(pair.basis), axis=1), step, atol=0.3)
+    assert abs(np.linalg.det(pair.basis)) == pytest.approx(step**2, rel=0.05)
+
+
+@pytest.mark.parametrize("step", [6.0, 9.0, 13.0])
+@pytest.mark.parametrize("turn_deg", [0.0, 4.0, 30.0])
+def test_fields_that_differ_by_turns_are_not_taken_for_one(step: float, turn_deg: float) -> None:
+    view = ruled(step, turn_deg, differing=0.6)
+    pair = best_pair(autocorrelation(view, np.ones((128, 128), np.float32)), least=4, most=60)
+    assert pair is not None
+    assert abs(np.linalg.det(pair.basis)) == pytest.approx(2 * step**2, rel=0.05)
