@@ -34,6 +34,7 @@ def answer_record(result: SynthesisResult, *, image: str, seconds: float) -> dic
         "region": [[round(x, 1), round(y, 1)] for x, y in result.region],
         "score": _rounded(result.score),
         "margin": _rounded(result.margin),
+        "false_alarms": result.false_alarms,
         "seconds": round(seconds, 3),
         "features": result.features,
         "seed": result.seed,
@@ -58,6 +59,7 @@ def _candidate_record(candidate: Candidate) -> dict[str, Any]:
         "structure": candidate.structure,
         "focal": candidate.focal_mm,
         "score": _rounded(candidate.score),
+        "false_alarms": candidate.false_alarms,
     }
 
 
