@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p3i.grammar.parser import parse
+from p3i.language import loads
 from p3i.search.answer import Answer
 from p3i.search.judge.accept import (
     LOG2_TESTS,
@@ -21,7 +21,7 @@ from p3i.search.propose import windows
 from p3i.search.propose.poses import pose_grid
 from p3i.search.result import NEEDED, StructureFound
 
-PROGRAM = parse("SetCameraPose(rx=1, ry=2)\nfor i in range(0, 9):\n    Draw(x=9*i, y=0)\n")
+PROGRAM = loads("SetCameraPose(rx=1, ry=2)\nfor i in range(0, 9):\n    Draw(x=9*i, y=0)\n")
 
 
 def answer(structure: StructureFound = "lattice", *, score: float, bits: float) -> Answer:
