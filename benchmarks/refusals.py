@@ -5,10 +5,10 @@ python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then
 python benchmarks/refusals.py --out scores.json        # every score, by kind of pattern
 
 Every family of the search (lattices, rings, ...) looks at every picture, and the best score that each reaches
-is kept. A picture is answered, as `p3i.synth` does, where an answer reaches the score and explains more bits
-than it costs. The crops are drawn from a seed, so every run sees the same; a crop that shares more
-than half of their joint area with an earlier one of its photo is drawn anew. It needs scikit-image (the extra
-`bench`), but downloads nothing.
+is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the score and
+more bits than the program costs, or by the number of false alarms (docs/search.md). The crops are drawn from
+a seed, so every run sees the same; a crop that shares more than half of their joint area with an earlier one
+of its photo is drawn anew. It needs scikit-image (the extra `bench`), but downloads nothing.
 """
 
 import argparse
@@ -31,6 +31,7 @@ from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
+from p3i.search.judge.accept import convincing, with_printed_scores
 from p3i.search.judge.bits import by_explained
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
@@ -91,11 +92,12 @@ MILD = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scores:
-    """The best score of each family on one picture, 0 where it proposed nothing."""
+    """The best score of each family on one picture, 0 where it proposed nothing, and the most bits."""
 
     name: str
     pattern: bool
     best: dict[str, float] = field(default_factory=dict)
+    bits: dict[str, float | None] = field(default_factory=dict)
     answered: bool = False
     seconds: float = 0.0
 
@@ -223,12 +225,29 @@ def measure(images: Iterable[tuple[str, Image]], config: SearchConfig, *, patter
             continue
         seconds = round(time.process_time() - begun, 2)
         best = {structure: _best(some) for structure, some in answers.items()}
-        answered = any(answer.score >= NEEDED and answer.worth > 0 for answer in explained)
-        found.append(Scores(name=name, pattern=pattern, best=best, answered=answered, seconds=seconds))
-        told = "  ".join(f"{structure} {score:.3f}" for structure, score in best.items())
-        said = "answered" if answered else "refused"
-        print(f"{name:40} {told}  {said:8} {seconds:.1f} s", flush=True)
+        told = with_printed_scores(evidence, explained, needed=NEEDED)
+        answered = any(answer.worth > 0 for answer in convincing(explained, told, needed=NEEDED))
+        bits = {one: _most_bits(explained, one) for one in answers}
+        scores = Scores(name=name, pattern=pattern, best=best, bits=bits, answered=answered, seconds=seconds)
+        found.append(scores)
+        _print_line(scores)
     return found
+
+
+def _most_bits(explained: Sequence[Answer], structure: str) -> float | None:
+    """The most bits that an answer of a structure explains, None where there is none."""
+    bits = [round(answer.worth, 1) for answer in explained if answer.structure == structure]
+    return max(bits, default=None)
+
+
+def _print_line(scores: Scores) -> None:
+    """A picture's scores and bits, family by family, and what became of it."""
+    families = []
+    for structure, score in scores.best.items():
+        bits = scores.bits[structure]
+        families.append(f"{structure} {score:.3f}" + ("" if bits is None else f" {bits:.0f} bits"))
+    said = "answered" if scores.answered else "refused"
+    print(f"{scores.name:40} {'  '.join(families)}  {said:8} {scores.seconds:.1f} s", flush=True)
 
 
 def _best(answers: Sequence[Answer]) -> float:

@@ -12,7 +12,7 @@ from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
 
 NEEDED = 0.13
-"""The score that an answer must reach (docs/benchmarks.md says what it was calibrated on)."""
+"""The score that suffices for an answer (docs/benchmarks.md says what it was calibrated on)."""
 
 StructureFound = Literal["lattice", "circular", "hybrid"]
 FocalSource = Literal["option", "header", "exif", "default", "pattern"]
@@ -49,7 +49,10 @@ class StopReason(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """One program that the search weighed, with its normalised score (docs/search.md) and its own focal."""
+    """One program that the search weighed, with its normalised score (docs/search.md) and its own focal.
+
+    `false_alarms` as in SynthesisResult.
+    """
 
     program: Program
     score: float
@@ -57,6 +60,7 @@ class Candidate:
     focal_mm: float = 35.0
     focal_source: FocalSource = "default"
     focal_reason: str = ""
+    false_alarms: float | None = None
 
     def record(self) -> dict[str, Any]:
         """The candidate as JSON has it."""
@@ -65,6 +69,7 @@ class Candidate:
             "structure": self.structure,
             "focal": self.focal_mm,
             "score": _rounded(self.score),
+            "false_alarms": self.false_alarms,
         }
 
 
@@ -73,7 +78,10 @@ class SynthesisResult:
     """The answer for one photo.
 
     `program` is None where nothing convinced; then `score` is the best that was seen, if any, and
-    `needed` what an answer must reach. `margin` is the lead over the best candidate of another meaning.
+    `needed` what it should have reached. `needed` is None for an answer with a lower score (docs/search.md):
+    one that `false_alarms` convinced of, or that fills the picture. `false_alarms` is the number of finds as
+    good as this one that are expected in a picture of noise, None where it cannot be said: for rings, hybrids
+    and where there is no program. `margin` is the lead over the best candidate of another meaning.
     `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
     why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at
@@ -94,6 +102,7 @@ class SynthesisResult:
     score: float | None = None
     margin: float | None = None
     needed: float | None = None
+    false_alarms: float | None = None
     candidates: tuple[Candidate, ...] = ()
     centers: tuple[tuple[float, float, int, int], ...] = ()
     focal_mm: float = 35.0
@@ -154,6 +163,7 @@ class SynthesisResult:
             "region": [[round(x, 1), round(y, 1)] for x, y in self.region],
             "score": _rounded(self.score),
             "margin": _rounded(self.margin),
+            "false_alarms": self.false_alarms,
             "seconds": None if seconds is None else round(seconds, 3),
             "features": self.features,
             "seed": self.seed,

@@ -13,8 +13,8 @@ from p3i.search.answer import Answer
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
 from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
+from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
 from p3i.search.judge.bits import by_explained
-from p3i.search.judge.evaluate import score_of_program
 from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
 from p3i.search.look.evidence import FINE, Evidence
@@ -54,7 +54,7 @@ def synthesize(
 ) -> SynthesisResult:
     """Find the camera and the program of the pattern on a photo.
 
-    The result's `program` is None where nothing reaches the score NEEDED; then `stop` and `score` say why.
+    The result's `program` is None where nothing convinces (judge/accept.py); then `stop` and `score` say why.
     The program has no header yet. A KeyboardInterrupt ends the search with the best that was found; a second
     one, while that is being finished, is raised.
     """
@@ -88,14 +88,8 @@ def _result(
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(session, answers)
-    told = [_with_printed_score(session, answer, needed) for answer in answers]
-    # A program that fills the picture is as sure as the part of it that was found, whatever lies beyond.
-    fills = config.extent == "image"
-    sure = [
-        after
-        for before, after in zip(answers, told, strict=True)
-        if before.score >= needed and (fills or after.score >= needed)
-    ]
+    told = with_printed_scores(session.evidence, answers, needed=needed)
+    sure = convincing(answers, told, needed=needed, fills=config.extent_used == "image")
     # What a person asked for is theirs to choose, whatever it costs.
     asked = asked_for(config) is not None
     seen = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
@@ -121,6 +115,10 @@ def _result(
         notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
     if session.unwritable - {first.structure}:
         notes = (*notes, unwritable_note(session))
+    centers = centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1)
+    by_score = first.score >= needed
+    if not by_score and config.extent_used == "found":
+        notes = (*notes, faint_note(first, len(centers)))
     session.tell("done", 1.0)
     session.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return _told(
@@ -131,17 +129,19 @@ def _result(
         structure=first.structure,
         score=first.score,
         margin=margin,
-        needed=needed,
+        needed=needed if by_score else None,
+        false_alarms=false_alarms(first.structure, first.worth),
         candidates=tuple(
             Candidate(
                 program=answer.program,
                 score=answer.score,
                 structure=answer.structure,
+                false_alarms=false_alarms(answer.structure, answer.worth),
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
             for answer in good[: config.top]
         ),
-        centers=centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
+        centers=centers,
         region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         lens_k1=first.lens_k1,
         pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
@@ -213,20 +213,6 @@ def _in_text(trace: Trace) -> Trace:
         trace({**step, "program": text} if "program" in step else step)
 
     return told
-
-
-def _with_printed_score(session: Session, answer: Answer, needed: float) -> Answer:
-    """An answer with the score of its finished program, which is what `p3i score` says of it.
-
-    While it was fitted, its family knew more than a program holds (other radii of a ring, numbers before they
-    were rounded); what that found not sure enough is none the surer.
-    """
-    if answer.score < needed:
-        return answer
-    score = score_of_program(
-        session.evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1
-    )
-    return replace(answer, score=score)
 
 
 def _in_sight(session: Session, answer: Answer) -> bool:

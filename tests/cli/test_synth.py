@@ -123,7 +123,7 @@ def test_jsonl_has_the_documented_keys_in_order(photo, capsys) -> None:
     record = json.loads(capsys.readouterr().out)
     assert list(record) == [
         "image", "width", "height", "program", "structure", "camera", "centers",
-        "region", "score", "margin", "seconds", "features", "seed",
+        "region", "score", "margin", "false_alarms", "seconds", "features", "seed",
     ]  # fmt: skip
     assert (record["image"], record["width"], record["height"]) == ("a.png", 64, 48)
     assert record["camera"] == {

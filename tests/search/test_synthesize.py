@@ -24,6 +24,7 @@ from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.families import Family
 from p3i.search.fit.grow import measure
+from p3i.search.judge import accept
 from p3i.search.result import NEEDED, StopReason, SynthesisResult
 from p3i.search.synthesize import focal_of, synthesize
 from p3i.size import Size
@@ -191,7 +192,7 @@ def answered_by(monkeypatch: pytest.MonkeyPatch, program: str, *, structure: str
 
 def test_a_program_that_costs_more_than_it_explains_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     answered_by(monkeypatch, "for j in range(0, 9):\n    Draw(x=9*Cos(40*j), y=9*Sin(40*j))\n")
-    monkeypatch.setattr(synthesize_module, "score_of_program", lambda *_, **__: 0.9)
+    monkeypatch.setattr(accept, "score_of_program", lambda *_, **__: 0.9)
     result = synthesize(photo(noise()), SearchConfig())
     assert (result.program, result.stop) == (None, StopReason.COSTS_MORE)
     assert result.reason == StopReason.COSTS_MORE.value

@@ -31,6 +31,7 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern, without_doubles
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
+from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import SIDE, frames, patch_contrast, sample_px, spacing
 from p3i.search.look.thinned import thinned
@@ -79,9 +80,10 @@ def by_explained(
     """The answers of several families, each list in its own order, as one list: most bits explained first.
 
     Every answer's `worth` becomes what it explains. Within a family the order stays, since that family knows
-    its own programs best; what is no answer (a score below `needed`, or no bits) stands in no other's way. A
-    hybrid that holds a ring, drawing its objects and more, says all that the ring says, measured by it:
-    it is worth what the ring is, and what its further objects explain beyond its higher cost.
+    its own programs best; what is no answer (judge/accept.py: a score below `needed` and too few bits to do
+    without, or none) stands in no other's way. A hybrid that holds a ring, drawing its objects and more, says
+    all that the ring says, measured by it: it is worth what the ring is, and what its further objects explain
+    beyond its higher cost.
     """
     told = [[(answer, explained(evidence, answer)) for answer in family] for family in answers]
     rings = [by_itself for family in told for answer, by_itself in family if answer.structure == "circular"]
@@ -92,9 +94,10 @@ def by_explained(
             beyond = [_beyond(by_itself, ring) for ring in rings if answer.structure == "hybrid"]
             bits = max(beyond, default=-math.inf)
             bits = by_itself.bits if bits == -math.inf else bits
-            together.append(replace(answer, worth=min(most, bits)))
-            if answer.score >= needed and bits > 0:
-                most = min(most, bits)
+            worth = min(most, bits)
+            together.append(replace(answer, worth=worth))
+            if (answer.score >= needed and bits > 0) or beyond_noise(answer.structure, worth):
+                most = worth
     return sorted(together, key=lambda answer: -answer.worth)
 
 

@@ -12,6 +12,7 @@ from p3i.search import synthesize as synthesis
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.families import Family
+from p3i.search.judge import accept
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.synthesize import centers_px, focal_of
@@ -37,7 +38,7 @@ def with_answers(monkeypatch: pytest.MonkeyPatch, *answers: Answer) -> None:
     monkeypatch.setattr(synthesis, "FAMILIES", (Family("lattice", find),))
     # The picture is noise, which no program explains: what an answer is worth is as the test says.
     monkeypatch.setattr(synthesis, "by_explained", as_found)
-    monkeypatch.setattr(synthesis, "score_of_program", lambda *_, **__: 0.9)
+    monkeypatch.setattr(accept, "score_of_program", lambda *_, **__: 0.9)
 
 
 def test_an_answer_with_its_own_focal_is_told_with_it(image: Image, monkeypatch) -> None:
