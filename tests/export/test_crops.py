@@ -96,3 +96,14 @@ def test_written_crops_are_the_crops_to_the_nearest_of_256_values(tmp_path) -> N
         np.testing.assert_array_equal(again.valid, known)
         off = np.abs(again.pixels - pixels)[known]
         assert off.max() <= 0.5 / 255 + 1e-5
+
+
+def test_a_straight_crop_has_as_many_pixels_as_its_cell_on_the_photo() -> None:
+    """The longest side of the upright box, here nearly the cell, keeps its pixels, near or far."""
+    found = objects_of(loads(LATTICE), ramp())
+    for each, pixels, _ in crops(found, ramp()):
+        if len(each.cell_px) != 4 or not each.inside:
+            continue
+        corners = np.array(each.cell_px)
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
+        assert 0.9 < max(pixels.shape[:2]) / longest < 1.35

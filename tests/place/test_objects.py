@@ -167,6 +167,11 @@ def test_places_on_a_bent_photo_are_where_its_lens_shows_them() -> None:
     # A barrel draws the corners in.
     assert ((moved * away).sum(axis=1)[[0, 11, 84, 95]] < -1).all()
     assert len(bent[0].cell_px) > len(straight[0].cell_px)
+    # A cell is as wide and high as the lens makes it: here up to a quarter less.
+    sides = [
+        np.ptp(b.cell_px, axis=0) / np.ptp(a.cell_px, axis=0) for a, b in zip(straight, bent, strict=True)
+    ]
+    assert np.min(sides) > 0.75 and np.max(sides) < 1.05
 
 
 def test_the_middle_of_rings_has_a_disc_for_its_cell() -> None:

@@ -78,3 +78,9 @@ def test_a_photo_is_laid_flat_only_where_the_header_names_a_lens() -> None:
     # Seen straight a corner lies 1 / (1 + k1) times as far out, and the canvas holds it.
     assert flat.photo.size.width == pytest.approx(400 / 0.9, abs=2)
     assert flat.seen.any() and not flat.seen[0, flat.photo.size.width // 2]
+
+
+def test_objects_a_million_units_away_are_counted_and_not_placed() -> None:
+    text = LATTICE.replace("8*i + 2*j + 1", "600000*i").replace("range(-2, 3)", "range(0, 4)")
+    found = placed(loads(text), blank())
+    assert (len(found.index), found.far) == (6, 6)

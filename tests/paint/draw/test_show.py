@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from marked import LATTICE, drawn
 
 from p3i import loads
 from p3i.errors import UsageError
-from p3i.paint.draw.scene import Labels, Strokes
+from p3i.paint.draw.scene import Dots, Labels, Strokes
 from p3i.paint.draw.show import show
 from p3i.vision.image import Image
 
@@ -69,3 +70,9 @@ def test_the_pictures_that_a_program_names_are_not_laid_over_its_photo() -> None
 def test_an_unknown_option_is_refused_by_name() -> None:
     with pytest.raises(UsageError, match="no option 'lables'"):
         show(grey(), loads(BOARD), lables="none")
+
+
+def test_dots_of_one_column_share_a_colour_and_columns_differ() -> None:
+    (dots,) = [p for p in show(drawn(LATTICE), loads(LATTICE)).scene.layers if isinstance(p, Dots)]
+    colours, counts = np.unique(dots.colours, axis=0, return_counts=True)
+    assert 1 < len(colours) < len(dots.centers) and counts.min() > 1
