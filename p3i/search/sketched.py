@@ -54,12 +54,14 @@ BY_HAND = Effort(60_000, 2_000, 10, 2)
 WALKED = Effort(24_000, 600, 4, 1)
 """For one of many that are walked through."""
 
-# An answer of this score is sure enough to look no further.
+# An answer that scores this by what it draws is sure enough to look no further.
 _ENOUGH = 0.35
 # Objects that a sketch may draw in the coarse search, and settings of its extents there.
 _MOST_INDICES, _MOST_SETTINGS = 64, 8
 # Of more objects in sight than this, so many say which are there.
 _MOST_WEIGHED = 2000
+# Fewer objects in sight say nothing.
+_FEWEST = 4
 # Rounds of registration.
 _ROUNDS, _LAST_ROUNDS = 3, 5
 # A pattern that was caught by its middle may grow by an object as often as this.
@@ -97,12 +99,12 @@ def find_by_sketch(
     maps: PointMaps | None = None
     with session.until_interrupted():
         for turn in range(effort.rounds):
-            enough = max((answer.score for answer in answers), default=0.0) >= _ENOUGH
+            enough = max((answer.worth for answer in answers), default=0.0) >= _ENOUGH
             if enough or not session.go_on():
                 break
             maps = maps or PointMaps.of(session.evidence)
             answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)
-    return _different(sorted(answers, key=lambda answer: -answer.score))
+    return _different(sorted(answers, key=lambda answer: -answer.worth))
 
 
 def _searched(
@@ -283,15 +285,13 @@ def _turned(filling: Filling, z: Tensor) -> Tensor:
 
 def _answer(session: Session, fit: _Fit) -> Answer:
     program = fit.curve.filling.program(fit.curve.z, fit.setting)
-    score = program_score(session, program)
-    return Answer(program, structure_of(program), score, score)
-
-
-def program_score(session: Session, program: Program) -> float:
-    """The normalised score of a program, as `p3i score` gives it; 0 where too little of it is in sight."""
-    if int(session.evidence.in_sight(compile(program)).sum()) < 4:
-        return 0.0
-    return score_of_program(session.evidence, program)
+    if int(session.evidence.in_sight(compile(program)).sum()) < _FEWEST:
+        return Answer(program, structure_of(program), 0.0, 0.0)
+    # What a curve explains beside its draws is told in its score, but makes it no better a filling.
+    score = score_of_program(session.evidence, program)
+    return Answer(
+        program, structure_of(program), score, score_of_program(session.evidence, program, elsewhere=False)
+    )
 
 
 def structure_of(program: Program) -> StructureFound:

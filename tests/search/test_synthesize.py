@@ -240,7 +240,7 @@ def test_a_ring_most_of_which_lies_outside_the_picture_is_no_answer(
     answered_by(
         monkeypatch, f"for j in range(0, 12):\n    Draw(x=24*Cos({angle}) + {x}, y=24*Sin({angle}) + {y})\n"
     )
-    monkeypatch.setattr(synthesize_module, "score_of_program", lambda *_, **__: 0.9)
+    monkeypatch.setattr("p3i.search.judge.accept.score_of_program", lambda *_, **__: 0.9)
     result = synthesize(ring.image(), SearchConfig())
     assert (result.program is not None) == shown
     assert result.stop is (StopReason.FOUND if shown else StopReason.OUT_OF_SIGHT)

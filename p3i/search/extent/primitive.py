@@ -52,6 +52,9 @@ _NEARLY_AS_GOOD = 0.5
 # This many cells, of one coset or of all, are enough to tell one lattice from another.
 _MOST_CELLS = 200
 _FEWEST = 4
+# Where so many of the cells know their coset, the cosets are kinds, and the doubled cell is the period:
+# halfway between one half, which is no rule, and all.
+_TOLD = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,9 +68,10 @@ class _Ground:
 def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tensor, Tensor]]:
     """The cells that the ground of `fit` may have, each as theta [P] and cells [N, 2]: one, or two.
 
-    Two where alternate cells differ, the doubled cell first: a chequered floor's differ because that is its
-    period, a crossword's or a letter board's because black and coloured fields fall on them unevenly. Only
-    the scores of the finished programs tell which it is. With too few cells the fit's own is the only one.
+    A chequered floor's alternate cells differ because that is its period, a crossword's or a letter board's
+    because black and coloured fields fall on them unevenly. The one is told by each cell's knowing its coset;
+    where they do not, the scores of the finished programs tell, the doubled cell coming first. With too few
+    cells the fit's own is the only one.
     """
     found = _Ground(fit.theta, fit.index[fit.support])
     if len(found.index) < _FEWEST:
@@ -77,8 +81,8 @@ def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tens
         if finer is None:
             break
         found = finer
-    coarser = _coarser(evidence, pattern, found)
-    both = [found] if coarser is None else [coarser, found]
+    coarser, told = _coarser(evidence, pattern, found)
+    both = [found] if coarser is None else [coarser] if told >= _TOLD else [coarser, found]
     return [(one.theta, one.index) for one in both]
 
 
@@ -97,26 +101,54 @@ def _finer(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground | N
     return None if best is None else best[1]
 
 
-def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground | None:
-    """The lattice with a doubled cell that tells apart what the present one mixes, if any."""
-    best: tuple[float, np.ndarray] | None = None
+def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Ground | None, float]:
+    """The lattice with a doubled cell that tells apart what the present one mixes, if any, and how surely.
+
+    How surely is the share of the cells that are more like the others of their own coset.
+    """
+    best: tuple[float, np.ndarray, np.ndarray] | None = None
     for rows in _DOUBLES:
         factors = np.array(rows)
         at = ground.index.numpy() @ np.linalg.inv(factors)
         coset = (np.abs(at - np.round(at)) > 1e-6).any(1).astype(int)
         likeness = _likeness(evidence, pattern, ground, coset, unless_alike=True)
         if likeness < _DIFFERENT and (best is None or likeness < best[0]):
-            best = likeness, factors
+            best = likeness, factors, coset
     if best is None:
-        return None
+        return None, 0.0
     lattice = Lattice.of(pattern, ground.theta)
     basis, change = _reduced(best[1].astype(float) @ lattice.basis)
     index = ground.index.numpy() @ np.linalg.inv(best[1])
     whole = (np.abs(index - np.round(index)) < 1e-6).all(1)
     if whole.sum() < _FEWEST:
-        return None
+        return None, 0.0
     index = torch.from_numpy(np.round(index[whole]) @ change)
-    return _Ground(lattice.with_basis(basis).theta(pattern), index)
+    return _Ground(lattice.with_basis(basis).theta(pattern), index), _told(evidence, pattern, ground, best[2])
+
+
+def _told(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray) -> float:
+    """The share of the cells that agree better with the others of their coset [N] than with the other coset.
+
+    All of a chequered floor's do, dark with dark. Where fields of several kinds lie without a rule, most are
+    of one kind and agree best with the coset that has more of it, whichever is theirs: then about half do.
+    In the features that tell the cosets apart best.
+    """
+    side = side_of_cell(evidence, pattern, ground.theta)
+    most = 0.0
+    for name in (None, "rgb"):
+        level = evidence.level_for(side, name=name)
+        groups = [
+            read_cells(level, pattern, ground.theta, cells[thinned(cells, _MOST_CELLS)], sample_grid())
+            for cells in (ground.index[coset == kind] for kind in np.unique(coset))
+        ]
+        means = [mean_cell(group, torch.ones(len(group.values)))[0] for group in groups]
+        lead = [
+            agreement_with_others(group, torch.ones(len(group.values)))
+            - agreement(group.values, means[1 - place][None], group.known)
+            for place, group in enumerate(groups)
+        ]
+        most = max(most, min(float((one > 0).double().mean()) for one in lead))
+    return most
 
 
 def _divided(pattern: Pattern, ground: _Ground, factors: np.ndarray) -> tuple[_Ground, np.ndarray]:

@@ -73,17 +73,25 @@ def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluati
 
 
 def score_of_program(
-    evidence: Evidence, program: Program, *, focal_mm: float | None = None, lens_k1: float | None = None
+    evidence: Evidence,
+    program: Program,
+    *,
+    focal_mm: float | None = None,
+    lens_k1: float | None = None,
+    elsewhere: bool = True,
 ) -> float:
     """The normalised score of a program as `evaluate` gives it, on a photo that is being looked at already.
 
     `focal_mm` is the program's own, None for the one that `evidence` assumes; `lens_k1` as in its header. 0
-    where fewer than two objects lie in the photo.
+    where fewer than two objects lie in the photo. Not `elsewhere`: of a curve only what it draws counts, as
+    where programs for the same objects are compared.
     """
     evidence = evidence if focal_mm is None else evidence.under(focal_mm)
     evidence, program = _without_lens(evidence, program, lens_k1)
     pattern = without_doubles(compile(program))
-    return normalised_score(evidence, pattern) if int(evidence.in_sight(pattern).sum()) >= 2 else 0.0
+    if int(evidence.in_sight(pattern).sum()) < 2:
+        return 0.0
+    return normalised_score(evidence, pattern, elsewhere=elsewhere)
 
 
 def _without_lens(evidence: Evidence, program: Program, k1: float | None) -> tuple[Evidence, Program]:
@@ -95,11 +103,11 @@ def _without_lens(evidence: Evidence, program: Program, k1: float | None) -> tup
     return looked_at, scaled(program, 1 / free.scale)
 
 
-def normalised_score(evidence: Evidence, pattern: Pattern) -> float:
+def normalised_score(evidence: Evidence, pattern: Pattern, *, elsewhere: bool = True) -> float:
     """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`.
 
     `pattern` draws no point twice. Cells are judged in the features that show most; curves and single rows at
-    the place of their sector that shows most.
+    the place of their sector that shows most, or, if not `elsewhere`, where they are drawn.
     """
     if sweeps_cells(pattern):
         return max((score_of(found.contrast) for found in judged_cells(evidence, pattern)), default=0.0)
@@ -108,6 +116,8 @@ def normalised_score(evidence: Evidence, pattern: Pattern) -> float:
         mean, count = mean_contrast(found.contrast), len(found.contrast)
         if score_of_curve(mean, count) > best:
             best = max(best, score_of_curve(placed_right(mean, found.misfit()), count))
+        if not elsewhere:
+            break  # the program's own place is the first
     return best
 
 

@@ -8,7 +8,8 @@ from truth import PATTERN, evidence_of, index_in, lattice_error, lattice_of, sma
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.config import SearchConfig
-from p3i.search.extent.primitive import _Ground, _likeness, primitive
+from p3i.search.extent.primitive import _Ground, _likeness,
+    _told, primitive
 from p3i.search.fit.grow import Fit, measure, side_of_cell
 from p3i.search.forms.lattice import Lattice
 from p3i.search.look.evidence import Evidence
@@ -58,8 +59,11 @@ SIDE = 6.0
 """A square of the chequered floor, in program units."""
 
 
-def chequered_floor() -> tuple[Evidence, Lattice]:
-    """A floor of light and dark squares under a tilted camera, and the lattice of its single squares."""
+def chequered_floor(*, without_rule: bool = False) -> tuple[Evidence, Lattice]:
+    """A floor of light and dark squares under a tilted camera, and the lattice of its single squares.
+
+    `without_rule` a quarter of the squares are dark, chosen at random.
+    """
     size = Size(448, 336)
     lattice = Lattice(-35.0, 10.0, np.eye(2) * SIDE, np.array([1.0, 2.0]))
     scale = 3
@@ -68,7 +72,8 @@ def chequered_floor() -> tuple[Evidence, Lattice]:
     matrix = image_from_plane(lattice.rx_deg, lattice.ry_deg, size=size, focal_mm=35.0).numpy()
     plane = np.linalg.inv(matrix) @ photo
     cell = (plane[:2] / plane[2]).T - lattice.origin
-    dark = np.round(cell / SIDE).sum(1) % 2 == 0
+    i, j = np.round(cell / SIDE).astype(int).T
+    dark = np.random.default_rng(7).random((200, 200))[i % 200, j % 200] < 0.25 if without_rule else (i + j) % 2 == 0
     grey = np.where(dark, 0.3, 0.75).reshape(x.shape).astype(np.float32)
     grey = cv2.resize(grey, (size.width, size.height), interpolation=cv2.INTER_AREA)
     noise = np.random.default_rng(0).normal(0, 0.015, (size.height, size.width, 3))
@@ -78,13 +83,23 @@ def chequered_floor() -> tuple[Evidence, Lattice]:
 
 def test_a_square_of_a_chequered_floor_is_half_a_cell() -> None:
     evidence, squares = chequered_floor()
-    (theta, index), (single, _) = primitive(evidence, PATTERN, fit_of(evidence, squares))
-    assert lattice_error(Lattice.of(PATTERN, single).basis, squares.basis) < 1e-6  # left to the score
+    [(theta, index)] = primitive(evidence, PATTERN, fit_of(evidence, squares))
     full = np.array([[1, 1], [1, -1]]) @ squares.basis
     assert lattice_error(Lattice.of(PATTERN, theta).basis, full) < 1e-6
     # Every second square is left: the ones of one colour, counted in the new steps.
     points = PATTERN.points_at(index, theta).numpy() - squares.origin
     assert set((np.round(points / SIDE).sum(1) % 2).tolist()) == {0.0}
+
+
+def test_squares_know_their_kind_on_a_chequered_floor_and_do_not_where_colours_have_no_rule() -> None:
+    shares = []
+    for without_rule in (False, True):
+        evidence, squares = chequered_floor(without_rule=without_rule)
+        fit = fit_of(evidence, squares)
+        ground = _Ground(fit.theta, fit.index[fit.support])
+        shares.append(_told(evidence, PATTERN, ground, (ground.index.sum(1) % 2).numpy().astype(int)))
+    assert shares[0] > 0.95
+    assert shares[1] < 0.7
 
 
 def test_the_full_cell_of_a_chequered_floor_stays() -> None:
