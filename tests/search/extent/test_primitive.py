@@ -8,8 +8,7 @@ from truth import PATTERN, evidence_of, index_in, lattice_error, lattice_of, sma
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.config import SearchConfig
-from p3i.search.extent.primitive import _Ground, _likeness,
-    _told, primitive
+from p3i.search.extent.primitive import _Ground, _likeness, _told, primitive
 from p3i.search.fit.grow import Fit, measure, side_of_cell
 from p3i.search.forms.lattice import Lattice
 from p3i.search.look.evidence import Evidence
@@ -73,7 +72,9 @@ def chequered_floor(*, without_rule: bool = False) -> tuple[Evidence, Lattice]:
     plane = np.linalg.inv(matrix) @ photo
     cell = (plane[:2] / plane[2]).T - lattice.origin
     i, j = np.round(cell / SIDE).astype(int).T
-    dark = np.random.default_rng(7).random((200, 200))[i % 200, j % 200] < 0.25 if without_rule else (i + j) % 2 == 0
+    dark = (i + j) % 2 == 0
+    if without_rule:
+        dark = np.random.default_rng(7).random((200, 200))[i % 200, j % 200] < 0.25
     grey = np.where(dark, 0.3, 0.75).reshape(x.shape).astype(np.float32)
     grey = cv2.resize(grey, (size.width, size.height), interpolation=cv2.INTER_AREA)
     noise = np.random.default_rng(0).normal(0, 0.015, (size.height, size.width, 3))
