@@ -56,6 +56,8 @@ WALKED = Effort(24_000, 600, 4, 1)
 
 # An answer that scores this by what it draws is sure enough to look no further.
 _ENOUGH = 0.35
+# A sketch can say a program where it draws its objects to within this share of their spacing.
+_SAID = 0.25
 # Objects that a sketch may draw in the coarse search, and settings of its extents there.
 _MOST_INDICES, _MOST_SETTINGS = 64, 8
 # Of more objects in sight than this, so many say which are there.
@@ -96,11 +98,13 @@ def find_by_sketch(
         return []
     starts = [start for answer in known if (start := written_in(every, answer.program)) is not None]
     answers = _answers(session, starts, done=0.0, share=0.0)
+    # A ring where a spiral is asked for is where a fit may begin, and no reason to look no further.
+    sayable = all(start.score > -_SAID for start in starts)
     maps: PointMaps | None = None
     with session.until_interrupted():
         for turn in range(effort.rounds):
             enough = max((answer.worth for answer in answers), default=0.0) >= _ENOUGH
-            if enough or not session.go_on():
+            if (enough and (turn > 0 or sayable)) or not session.go_on():
                 break
             maps = maps or PointMaps.of(session.evidence)
             answers += _searched(session, maps, every, effort=effort, done=turn / effort.rounds)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import torch
 
 import p3i
 from p3i.evaluation.program_scenes import program_scene, spacing_px
@@ -12,6 +13,12 @@ from p3i.evaluation.scene import Scene
 from p3i.grammar.leaves import leaves
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.camera import Camera
+from p3i.search import sketched
+from p3i.search.answer import Answer
+from p3i.search.config import SearchConfig
+from p3i.search.forms.guess import Found
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
 from p3i.search.result import StopReason, SynthesisResult
 
 TRUTH = {
@@ -153,3 +160,25 @@ def test_trace_tells_grid_and_fits() -> None:
     holes = sketch(TRUTH["staggered row"].replace("rx=-40", "rx=~-41"))
     p3i.synth(scene("staggered row").image(), sketch=holes, trace=lambda step: steps.append(step["step"]))
     assert "grid" in steps and "fit" in steps
+
+
+@pytest.mark.parametrize(("off", "looked"), [(0.05, False), (0.6, True)])
+def test_a_start_that_the_sketch_cannot_say_is_no_reason_to_look_no_further(
+    monkeypatch: pytest.MonkeyPatch, off: float, looked: bool
+) -> None:
+    """A ring is near a spiral, and explains enough of it to seem sure."""
+    near = Answer(p3i.loads(TRUTH["arc"]), "circular", 0.6, 0.6)
+    told: list[float] = []
+
+    def searched(*_: object, done: float, **__: object) -> list[Answer]:
+        told.append(done)
+        return []
+
+    monkeypatch.setattr(sketched, "_answers", lambda *_, **__: [near])
+    monkeypatch.setattr(sketched, "_searched", searched)
+    monkeypatch.setattr(sketched.PointMaps, "of", lambda _: None)
+    monkeypatch.setattr(sketched, "written_in", lambda every, _: Found(every[0], torch.zeros(0), 0, -off))
+    image = scene("spiral").image()
+    session = Session(Evidence(image, SearchConfig(), 35.0), SearchConfig())
+    sketched.find_by_sketch(session, sketch(SKETCHES["spiral"]), known=[near])
+    assert bool(told) == looked
