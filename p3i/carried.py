@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from xml.etree import ElementTree
 
 from p3i.errors import FileError
-from p3i.files import read_bytes
+from p3i.files import read_bytes, spoken
 from p3i.grammar.ast import Program
 from p3i.grammar.layout import most_bytes, source_text
 from p3i.grammar.parse_error import ParseError
@@ -42,7 +42,7 @@ def read_program(path: Place) -> Program:
     Raises FileError where the file cannot be read or is a picture without a program, ParseError where the
     text is no program, or a sketch whose holes are still open.
     """
-    name = _name(path)
+    name = spoken(path)
     data = read_bytes(path)
     return _parsed(data if (text := _carried(data, name)) is None else text, name)
 
@@ -52,7 +52,7 @@ def read_either(path: Place) -> "Program | Image":
 
     The file is read once. Raises FileError for what cannot be read, ParseError for a text that is no program.
     """
-    name = _name(path)
+    name = spoken(path)
     data = read_bytes(path)
     if not _is_photo(data):
         return _parsed(data if (text := _carried(data, name)) is None else text, name)
@@ -68,7 +68,7 @@ def read_source(path: Place) -> tuple[bytes, bool]:
     cannot be read or is a picture without a program.
     """
     data = read_bytes(path, most=_MOST_DRAWN, cut=True)
-    text = _carried(data, _name(path))
+    text = _carried(data, spoken(path))
     return (data[: most_bytes() + 1], False) if text is None else (text.encode("utf-8"), True)
 
 
@@ -146,7 +146,3 @@ def _parsed(source: str | bytes, name: str) -> Program:
     if isinstance(parsed, Program):
         return parsed
     raise ParseError(parsed, source=source_text(source), path=name)
-
-
-def _name(path: Place) -> str:
-    return "standard input" if os.fspath(path) == "-" else os.fspath(path)

@@ -70,6 +70,11 @@ def as_text(name: str) -> str:
     return os.fsencode(name).decode("utf-8", errors="replace")
 
 
+def spoken(name: Name) -> str:
+    """A file's name in messages; `-` is standard input."""
+    return "standard input" if os.fspath(name) == "-" else os.fspath(name)
+
+
 def names_folder(text: str) -> bool:
     """Whether the output `text` means a folder: one that exists, or a name that ends with a slash.
 
@@ -105,7 +110,7 @@ def read_bytes(path: Name, *, most: int = MOST_BYTES, cut: bool = False) -> byte
     Raises FileError with the reason where there is nothing to read, UsageError for an empty name.
     """
     if os.fspath(path) == "-":
-        return _up_to(_standard_input(), most, name="standard input", cut=cut)
+        return _up_to(_standard_input(), most, name=spoken(path), cut=cut)
     try:
         kind = os.stat(named(path)).st_mode
         if stat.S_ISDIR(kind):

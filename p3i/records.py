@@ -74,3 +74,9 @@ def check_focal(focal_mm: float | None) -> None:
     """Raise UsageError for a focal length (mm) out of range; None is none stated."""
     if focal_mm is not None and not (math.isfinite(focal_mm) and 1 <= focal_mm <= 10_000):
         raise UsageError(f"a focal length lies between 1 and 10000 mm, not {focal_mm:g}")
+
+
+def check_max_px(max_px: int) -> None:
+    """Raise UsageError for a limit of pixels that no picture keeps to."""
+    if max_px < 1:
+        raise UsageError(f"the limit of pixels must be at least 1, not {max_px}")

@@ -79,19 +79,15 @@ class Talk:
     def say(self, sentences: Iterable[str], *, name: str, kind: str = "note") -> None:
         """Say sentences about an input, unless asked to be quiet."""
         for sentence in () if self.quiet else sentences:
-            message = sentence if self.as_json else f"{shown(name)}: {sentence}"
+            message = sentence if self.as_json else f"{files.spoken(name)}: {sentence}"
             report.line(message, as_json=self.as_json, kind=kind, image=name)
 
     def refuse(self, sentence: str, *, name: str, code: int) -> int:
         """Say what is wrong with an input; returns the exit code."""
-        message = sentence if self.as_json or shown(name) in sentence else f"{shown(name)}: {sentence}"
+        shown = files.spoken(name)
+        message = sentence if self.as_json or shown in sentence else f"{shown}: {sentence}"
         report.line(message, as_json=self.as_json, code=code, image=name)
         return code
-
-
-def shown(name: str) -> str:
-    """An input's name in messages."""
-    return "standard input" if name == STDOUT else name
 
 
 def exit_code(codes: Iterable[int]) -> int:
@@ -114,7 +110,7 @@ def run(inputs: Sequence[str], work: Work, *, to: Targets, talk: Talk) -> int:
 
         def finish(number: int) -> int:
             name, answer_to, facts_to = inputs[number], to.answers[number], to.facts[number]
-            label = Path(shown(name)).name
+            label = Path(files.spoken(name)).name
             label = label if len(inputs) == 1 else f"{number + 1}/{len(inputs)} {label}"
             with progress.bar(label, wanted=not talk.quiet) as update:
                 answer = work(name, update)

@@ -9,12 +9,10 @@ import click
 
 from p3i.carried import read_source
 from p3i.cli import report
-from p3i.cli.inputs import files, listed
+from p3i.cli.inputs import PROGRAMS, files
 from p3i.errors import FileError, P3IError, UsageError
-from p3i.files import gather
 from p3i.grammar.parse_error import ParseError
 
-SUFFIXES = frozenset({".p3p"})
 STDIN = "-"
 
 
@@ -27,11 +25,7 @@ def sources(
     """
     for word in words:
         try:
-            paths = (
-                [STDIN]
-                if word == STDIN
-                else [str(path) for path in gather(listed([word]), suffixes=SUFFIXES)]
-            )
+            paths = (STDIN,) if word == STDIN else files([word], suffixes=PROGRAMS)
         except P3IError as error:
             report.p3i_error(error, as_json=as_json)
             yield error
@@ -50,7 +44,7 @@ def sources(
 
 def one(word: str) -> tuple[str, bytes]:
     """The one program that a word names, as (name, its text). Raises FileError, UsageError for several."""
-    paths = (STDIN,) if word == STDIN else files([word], suffixes=SUFFIXES)
+    paths = (STDIN,) if word == STDIN else files([word], suffixes=PROGRAMS)
     if len(paths) != 1:
         raise UsageError(f"{word} names {len(paths)} programs: name one")
     (path,) = paths

@@ -30,9 +30,7 @@ def command(
         raise UsageError(f"-o FILE names a picture, {' or '.join(_KINDS)}")
     files.check_writable(Path(output), force=force)
     film = api.trace(trace, image=image)
-    from p3i.vision.write import write_bytes
-
-    write_bytes(output, film.encode(Path(output).suffix.lower()), force=force)
+    files.write_bytes(output, film.encode(Path(output).suffix.lower()), force=force)
     for note in () if quiet else film.notes:
         as_json = error_format == "json"
         report.line(note if as_json else f"{trace}: {note}", as_json=as_json, kind="note")

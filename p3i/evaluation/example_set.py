@@ -9,11 +9,11 @@ from pathlib import Path
 from p3i.errors import FileError, UsageError
 from p3i.evaluation.annotations import annotation
 from p3i.evaluation.scenes import Scene, scene
-from p3i.files import check_writable, make_folder, replacing
+from p3i.files import check_writable, make_folder, replacing, write_bytes
 from p3i.grammar.ast import Header
 from p3i.grammar.printer import format_program
 from p3i.search.result import StructureFound
-from p3i.vision.write import encode, write_bytes
+from p3i.vision.write import encode
 
 MOST = 1000
 """Scenes of one structure in a set: scene k of the set of a seed has the seed `seed * MOST + k`."""

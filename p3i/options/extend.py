@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
 
 SIDES = ("left", "top", "right", "bottom")
 """The sides of a picture, in the order in which margins are given."""
@@ -79,6 +79,5 @@ class ExtendOptions:
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
-        if self.max_px < 1:
-            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+        check_max_px(self.max_px)
         check_focal(self.focal_mm)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
 
 Crop = Literal["pattern", "inside", "all", "same"]
 CROPS: tuple[Crop, ...] = get_args(Crop)
@@ -87,8 +87,7 @@ class RectifyOptions:
             raise UsageError(f"a crop is one of {', '.join(CROPS)}, not {self.crop!r}")
         if self.scale is not None and not (math.isfinite(self.scale) and 0 < self.scale <= 100):
             raise UsageError(f"a scale lies above 0 and up to 100, not {self.scale:g}")
-        if self.max_px < 1:
-            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+        check_max_px(self.max_px)
         if self.tolerance is not None and not 0 <= self.tolerance < 255:
             raise UsageError(f"a tolerance lies from 0 to below 255, not {self.tolerance:g}")
         check_focal(self.focal_mm)

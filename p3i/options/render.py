@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
 from p3i.size import Size, parse_size
 
 KINDS = ("png", "svg", "pdf")
@@ -56,8 +56,7 @@ class RenderOptions:
         units = self.sprite_units
         if units is not None and not (math.isfinite(units) and 0 < units <= 1e6):
             raise UsageError(f"a picture's side is more than 0 program units, not {units:g}")
-        if self.max_px < 1:
-            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+        check_max_px(self.max_px)
 
 
 def kind_of(path: str | PathLike[str]) -> str:

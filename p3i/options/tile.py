@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, Spelt, check_focal
+from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
 from p3i.size import Size, parse_size
 
 TileSource = Literal["mean", "best"]
@@ -63,6 +63,5 @@ class TileOptions:
             raise UsageError(
                 f"a tile has at least 4 pixels a side, not {self.size.width} x {self.size.height}"
             )
-        if self.max_px < 1:
-            raise UsageError(f"the limit of pixels must be at least 1, not {self.max_px}")
+        check_max_px(self.max_px)
         check_focal(self.focal_mm)

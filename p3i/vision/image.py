@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from p3i.errors import FileError
-from p3i.files import read_bytes
+from p3i.files import read_bytes, spoken
 from p3i.size import Size
 from p3i.vision.decode import Source, decode
 from p3i.vision.write import write_image as write_image
@@ -59,7 +59,7 @@ def read_image(path: str | os.PathLike[str], *, max_px: int = MAX_PX) -> Image:
     animation the first frame (a note says so). Raises FileError, with a reason of its own for each: missing,
     a folder, no permission, empty, no picture, cut off, HEIC without its extra, more than `max_px` pixels.
     """
-    return image_of(read_bytes(path), name=_name(path), max_px=max_px)
+    return image_of(read_bytes(path), name=spoken(path), max_px=max_px)
 
 
 def image_of(data: bytes, *, name: str, max_px: int = MAX_PX) -> Image:
@@ -74,7 +74,7 @@ def read_mask(path: str | os.PathLike[str], size: Size, *, max_px: int = MAX_PX)
     Transparent parts of the file are not marked. Raises FileError where the mask is not of the photo's
     `size` (as it stands upright), has colours, marks nothing or marks everything.
     """
-    name = _name(path)
+    name = spoken(path)
     found = decode(read_bytes(path), name=name, max_px=max_px)
     height, width = found.known.shape
     if (width, height) != (size.width, size.height):
@@ -126,6 +126,12 @@ def resized(image: Image, longer: int) -> Image:
     return replace(image, pixels=pixels, valid=weight >= 0.5 - 1e-6, stride=image.stride * scale)
 
 
+def resized_from_photo(scale: float) -> np.ndarray:
+    """The matrix [3, 3] that takes pixels of a picture to those of one `scale` times as large."""
+    shift = 0.5 * scale - 0.5
+    return np.array([[scale, 0, shift], [0, scale, shift], [0, 0, 1]])
+
+
 def _area_mean(array: np.ndarray, scale: float) -> np.ndarray:
     """An array [H, W(, C)] reduced `scale` times on both axes, each pixel the mean of its area."""
     # With fx and fy OpenCV keeps the scale exact; with a target size it would stretch the shorter side.
@@ -135,7 +141,3 @@ def _area_mean(array: np.ndarray, scale: float) -> np.ndarray:
         target = max(1, round(width / scale)), max(1, round(height / scale))
         return cv2.resize(array, target, interpolation=cv2.INTER_AREA)
     return cv2.resize(array, None, fx=1 / scale, fy=1 / scale, interpolation=cv2.INTER_AREA)
-
-
-def _name(path: str | os.PathLike[str]) -> str:
-    return "standard input" if os.fspath(path) == "-" else os.fspath(path)

@@ -7,12 +7,13 @@ from os import PathLike
 import numpy as np
 
 from p3i.errors import UsageError
+from p3i.files import write_bytes
 from p3i.size import Size
 from p3i.vision.exif import reframed_exif
 from p3i.vision.image import Image
 from p3i.vision.picture_kinds import PICTURE_KINDS, picture_kind
 from p3i.vision.tiff import has_tifffile
-from p3i.vision.write import encode, write_bytes
+from p3i.vision.write import encode
 
 _WITHOUT_ALPHA = {"jpg"}
 

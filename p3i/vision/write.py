@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image as Pil
 
 from p3i.errors import FileError, UsageError
-from p3i.files import write_bytes as write_bytes
+from p3i.files import write_bytes
 from p3i.vision.decode import swap_red_blue
 from p3i.vision.exif import upright_exif
 from p3i.vision.tiff import encode_tiff_16

@@ -10,7 +10,7 @@ from p3i.paint.draw.sprite import in_front, plain, premultiplied
 from p3i.paint.draw.view import View
 from p3i.place.flat import laid_flat
 from p3i.size import Size
-from p3i.vision.image import Image, resized
+from p3i.vision.image import Image, resized, resized_from_photo
 from p3i.vision.warp import warp_pixels
 
 
@@ -52,12 +52,8 @@ def photo_layer(photo: Image, view: View, *, k1: float | None) -> np.ndarray:
     shrink = float(np.sqrt(max(density, 1e-12)))
     if shrink > 1.3:
         small = resized(photo, max(1, round(photo.size.longer / shrink)))
-        scale = small.size.longer / photo.size.longer
-        shift = (scale - 1) / 2
-        photo, photo_from_plane = (
-            small,
-            np.array([[scale, 0, shift], [0, scale, shift], [0, 0, 1]]) @ photo_from_plane,
-        )
+        photo_from_plane = resized_from_photo(small.size.longer / photo.size.longer) @ photo_from_plane
+        photo = small
     photo_from_canvas = photo_from_plane @ plane_from_canvas
     padded = np.pad(_rgba(photo), ((1, 1), (1, 1), (0, 0)))  # transparent all around
     padded_from_photo = np.array([[1.0, 0, 1], [0, 1, 1], [0, 0, 1]])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from p3i.errors import FileError, UsageError
+from p3i.files import write_bytes
 from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
@@ -36,7 +37,7 @@ from p3i.place.placed import FocalSource, camera_of
 from p3i.records import changed
 from p3i.size import Size, refuse_huge
 from p3i.vision.image import Image, read_image
-from p3i.vision.write import encode, write_bytes
+from p3i.vision.write import encode
 
 Path_ = str | PathLike[str]
 

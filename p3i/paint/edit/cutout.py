@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.paint.fill.sources import taken
 from p3i.place.moves import frames
 from p3i.place.outlines import chart_of, pitch
 from p3i.place.placed import Placed
@@ -23,6 +22,7 @@ from p3i.vision.fill import filled
 from p3i.vision.image import Image
 from p3i.vision.lab import lab_of
 from p3i.vision.sheet import project
+from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

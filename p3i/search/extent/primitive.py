@@ -8,6 +8,7 @@ different. Looks are compared both in the search's features and in colour. Where
 without a rule, the kinds are never spread evenly: there the finer lattice is handed on beside the coarser.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,14 +134,8 @@ def _told(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarr
     of one kind and agree best with the coset that has more of it, whichever is theirs: then about half do.
     In the features that tell the cosets apart best.
     """
-    side = side_of_cell(evidence, pattern, ground.theta)
     most = 0.0
-    for name in (None, "rgb"):
-        level = evidence.level_for(side, name=name)
-        groups = [
-            read_cells(level, pattern, ground.theta, cells[thinned(cells, _MOST_CELLS)], sample_grid())
-            for cells in (ground.index[coset == kind] for kind in np.unique(coset))
-        ]
+    for groups in _by_coset(evidence, pattern, ground, coset):
         means = [mean_cell(group, torch.ones(len(group.values)))[0] for group in groups]
         lead = [
             agreement_with_others(group, torch.ones(len(group.values)))
@@ -182,14 +177,8 @@ def _likeness(
     kinds = np.unique(coset)
     if len(kinds) < 2 or min(int((coset == kind).sum()) for kind in kinds) < 3:
         return 1.0
-    side = side_of_cell(evidence, pattern, ground.theta)
     least = 1.0
-    for name in (None, "rgb"):
-        level = evidence.level_for(side, name=name)
-        groups = [
-            read_cells(level, pattern, ground.theta, cells[thinned(cells, _MOST_CELLS)], sample_grid())
-            for cells in (ground.index[coset == kind] for kind in kinds)
-        ]
+    for groups in _by_coset(evidence, pattern, ground, coset):
         ones = [torch.ones(len(group.values)) for group in groups]
         own = float(
             torch.cat([agreement_with_others(g, w) for g, w in zip(groups, ones, strict=True)]).median()
@@ -207,6 +196,19 @@ def _likeness(
         ]
         least = min(least, min(across) / own)
     return least
+
+
+def _by_coset(
+    evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray
+) -> Iterator[list[Cells]]:
+    """The cells of each coset [N], as the search's features show them, then as colours do."""
+    side = side_of_cell(evidence, pattern, ground.theta)
+    for name in (None, "rgb"):
+        level = evidence.level_for(side, name=name)
+        yield [
+            read_cells(level, pattern, ground.theta, cells[thinned(cells, _MOST_CELLS)], sample_grid())
+            for cells in (ground.index[coset == kind] for kind in np.unique(coset))
+        ]
 
 
 def _agreement_of_all(groups: list[Cells]) -> float:

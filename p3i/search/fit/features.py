@@ -12,6 +12,7 @@ from torch import Tensor
 
 from p3i.interp.pattern import Pattern
 from p3i.search.fit.slopes import with_slopes
+from p3i.search.forms.filling import Filling
 from p3i.search.look.cells import sample_grid, sample_points
 from p3i.search.look.evidence import Level
 from p3i.vision.warp import sample, sample_valid
@@ -66,6 +67,12 @@ def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = fro
         places.append(place)
         limits.append(limit)
     return FreeNumbers(tuple(places), tuple(limits))
+
+
+def step_limits(filling: Filling, theta: Tensor) -> list[float]:
+    """The most that one step may move each moving number of a filling, [F]: `free_numbers` at theta [P]."""
+    limits = dict(zip(filling.pattern.paths, free_numbers(filling.pattern, theta).limits, strict=True))
+    return [limits[unknown.name] for unknown in filling.moving]
 
 
 def refine(

@@ -19,15 +19,15 @@ from p3i.search.look.patches import find_objects, frames, misfit, patch_contrast
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
-# Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise.
-_FOCAL_SPREAD = 0.35
+FOCAL_SPREAD = 0.35
+"""Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise."""
 # The certainty of a focal that is held.
 _HELD = 1e12
-# One step moves angles by at most so many degrees, lengths by this share of a patch, the focal's logarithm
-# by this.
+# One step moves angles by at most so many degrees, lengths by this share of a patch.
 _MOST_TURN_DEG = 4.0
 _MOST_SHIFT = 0.4
-_MOST_ZOOM = 0.15
+MOST_ZOOM = 0.15
+"""One step moves the focal's logarithm by at most this."""
 _FEWEST = 3
 
 
@@ -125,7 +125,7 @@ def registered(
     focal_mm = fit.focal_mm
     if free_focal:
         expected = evidence.focal_mm
-        numbers = fitted(focal_mm, expected_mm=expected, certainty_of_focal=1 / _FOCAL_SPREAD**2)
+        numbers = fitted(focal_mm, expected_mm=expected, certainty_of_focal=1 / FOCAL_SPREAD**2)
         told = float(numbers[-1].exp())
         focal_mm = min(max(told, FOCALS_MM[0]), FOCALS_MM[1])
         if focal_mm != told and math.isfinite(
@@ -187,4 +187,4 @@ def _limits(fit: CurveFit) -> Tensor:
             limits.append(math.degrees(_MOST_SHIFT * fit.side / radius))
         else:
             limits.append(_MOST_SHIFT * fit.side)
-    return torch.tensor([*limits, _MOST_ZOOM], dtype=torch.float64)
+    return torch.tensor([*limits, MOST_ZOOM], dtype=torch.float64)

@@ -60,7 +60,7 @@ def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluati
     given = None if config.focal_mm == "auto" else config.focal_mm
     focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
     k1 = program.header.lens_k1 if program.header is not None else None
-    evidence, program = _without_lens(Evidence(image, config, focal_mm), program, k1)
+    evidence, program = without_lens(Evidence(image, config, focal_mm), program, k1)
     refuse_edge_on(Camera.of(program, focal_mm=evidence.focal_mm))
     pattern = without_doubles(compile(program))
     refuse_far_steps(pattern, pattern.index.numpy())
@@ -87,20 +87,19 @@ def score_of_program(
     where programs for the same objects are compared.
     """
     evidence = evidence if focal_mm is None else evidence.under(focal_mm)
-    evidence, program = _without_lens(evidence, program, lens_k1)
+    evidence, program = without_lens(evidence, program, lens_k1)
     pattern = without_doubles(compile(program))
     if int(evidence.in_sight(pattern).sum()) < 2:
         return 0.0
     return normalised_score(evidence, pattern, elsewhere=elsewhere)
 
 
-def _without_lens(evidence: Evidence, program: Program, k1: float | None) -> tuple[Evidence, Program]:
-    """A program is judged as it was found: on the photo freed of its lens, in units of that canvas."""
+def without_lens(evidence: Evidence, program: Program, k1: float | None) -> tuple[Evidence, Program]:
+    """A program as it was found, and what it is judged by: the photo freed of its lens, in its units."""
     if not k1:
         return evidence, program
     free = straightened(evidence.image, k1)
-    looked_at = Evidence(free.image, evidence.config, evidence.focal_mm / free.scale, free.points_on_photo)
-    return looked_at, scaled(program, 1 / free.scale)
+    return free.looked_at(evidence), scaled(program, 1 / free.scale)
 
 
 def normalised_score(evidence: Evidence, pattern: Pattern, *, elsewhere: bool = True) -> float:

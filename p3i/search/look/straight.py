@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 
 from p3i.interp.lens import photo_from_straight
+from p3i.search.look.evidence import Evidence
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.warp import pixel_grid, remapped
@@ -28,6 +29,10 @@ class Straightened:
         """Points [..., 2] in pixels of `image` as pixels of the photo as it was taken."""
         on_photo = shifted(points_px, self.image.size, self.photo_size)
         return photo_from_straight(on_photo, self.k1, size=self.photo_size)[0]
+
+    def looked_at(self, evidence: Evidence) -> Evidence:
+        """The `evidence` of the photo as it was taken, on `image` instead: its focal is of that canvas."""
+        return Evidence(self.image, evidence.config, evidence.focal_mm / self.scale, self.points_on_photo)
 
 
 def straightened(image: Image, k1: float) -> Straightened:

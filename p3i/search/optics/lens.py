@@ -17,7 +17,8 @@ from p3i.interp.camera import project
 from p3i.interp.lens import photo_from_straight
 from p3i.search.answer import Answer
 from p3i.search.config import MOST_K1
-from p3i.search.fit.features import free_numbers
+from p3i.search.fit.features import step_limits
+from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
 from p3i.search.fit.robust import robust_fit
 from p3i.search.forms.whole import scaled, whole_filling
 from p3i.search.look.evidence import Evidence
@@ -31,8 +32,6 @@ from p3i.vision.warp import in_frame
 _SHARE_NOISE, _PIXEL_NOISE = 0.03, 0.3
 # k1 before anything is known: none, give or take this.
 _PRIOR_SPREAD = 0.2
-# The logarithm of the focal, where the pattern was to tell it, is known to this; a step moves it by that.
-_FOCAL_SPREAD, _MOST_ZOOM = 0.35, 0.15
 # A lens is believed in where k1 is so many times its own uncertainty, and not too small to matter.
 _SIGMAS, _LEAST_K1 = 4.0, 0.015
 # Two estimates this close are one.
@@ -98,8 +97,7 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
     noise = (_PIXEL_NOISE**2 + (_SHARE_NOISE * cell_px) ** 2).sqrt()
     # Where the pattern was to tell the focal, an egg may have been taken for a circle under a wrong one.
     free_focal = answer.focal_mm is not None
-    limits = dict(zip(pattern.paths, free_numbers(pattern, theta).limits, strict=True))
-    steps = [*(limits[one.name] for one in filling.moving), *([_MOST_ZOOM] if free_focal else []), 0.05]
+    steps = [*step_limits(filling, theta), *([MOST_ZOOM] if free_focal else []), 0.05]
 
     def points_of(moving: torch.Tensor) -> torch.Tensor:
         theta = filling.theta(moving[..., : len(numbers)])
@@ -115,7 +113,7 @@ def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit
     start = torch.cat([numbers, torch.tensor(more, dtype=torch.float64)])
     prior = torch.zeros(len(start), 2, dtype=torch.float64)
     if free_focal:
-        prior[-2, 0], prior[-2, 1] = math.log(evidence.focal_mm), 1 / _FOCAL_SPREAD**2
+        prior[-2, 0], prior[-2, 1] = math.log(evidence.focal_mm), 1 / FOCAL_SPREAD**2
     prior[-1, 1] = 1 / _PRIOR_SPREAD**2
     whiten = torch.eye(2, dtype=torch.float64) / noise[:, None, None]
     moved = robust_fit(
@@ -171,10 +169,8 @@ def _on_photo(seen: Straightened, answer: Answer) -> Answer:
 
 def _searched(seen: Straightened, session: Session, search: Search) -> tuple[list[Answer], Evidence]:
     """The answers on a straightened photo, in units of its own canvas, and what was looked at."""
-    focal_mm = session.evidence.focal_mm / seen.scale
-    evidence = Evidence(seen.image, session.config, focal_mm, seen.points_on_photo)
+    evidence = seen.looked_at(session.evidence)
     again = dataclasses.replace(session, evidence=evidence)
-    again.rings = None  # those were of the photo as it is
     found = search(again)
     session.stopped = again.stopped
     return found, evidence

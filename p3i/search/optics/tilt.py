@@ -19,22 +19,22 @@ from torch import Tensor
 
 from p3i.interp.camera import project
 from p3i.search.answer import Answer
-from p3i.search.fit.features import free_numbers
+from p3i.search.fit.features import step_limits
+from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.forms.filling import Filling
-from p3i.search.forms.whole import scaled, whole_filling
+from p3i.search.forms.whole import whole_filling
+from p3i.search.judge.evaluate import without_lens
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import find_objects, frames, half_steps, spacing, whitening
-from p3i.search.look.straight import straightened
 from p3i.search.look.thinned import thinned
 
 TOLD_DEG = 3.0
 """A tilt that is known no better than this is told of in words."""
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 100
-# What is known before anything is seen: tilts are within this, the focal's logarithm within that.
+# What is known before anything is seen: tilts are within this (and the focal as in fit/places.py).
 _TILT_SPREAD_DEG = 30.0
-_FOCAL_SPREAD, _MOST_ZOOM = 0.35, 0.15
 # Before any residual is seen, places stray half as far as `whitening` says; that counts as so many residuals.
 _NOISE_VARIANCE, _NOISE_COUNTS = 0.25, 4.0
 _ROUNDS = 3
@@ -51,12 +51,9 @@ def pose_sigma_deg(evidence: Evidence, answer: Answer) -> float | None:
     that people more or less face what they photograph. None where the photo shows fewer than two objects of
     the program.
     """
-    program, focal_mm = answer.program, answer.focal_mm or evidence.focal_mm
-    if answer.lens_k1:
-        seen = straightened(evidence.image, answer.lens_k1)
-        focal_mm /= seen.scale
-        evidence = Evidence(seen.image, evidence.config, focal_mm, seen.points_on_photo)
-        program = scaled(program, 1 / seen.scale)
+    evidence = evidence.under(answer.focal_mm or evidence.focal_mm)
+    evidence, program = without_lens(evidence, answer.program, answer.lens_k1)
+    focal_mm = evidence.focal_mm
     whole = whole_filling(program)
     if whole is None:
         return None
@@ -122,12 +119,11 @@ def _covariance(
         seen = pattern.image_from_plane(moved, size=size, focal_mm=focal)
         return project(seen, pattern.points_at(index, moved))[0]
 
-    limits = dict(zip(pattern.paths, free_numbers(pattern, theta).limits, strict=True))
-    steps = [*(limits[one.name] for one in filling.moving), *([_MOST_ZOOM] if free_focal else [])]
+    steps = [*step_limits(filling, theta), *([MOST_ZOOM] if free_focal else [])]
     start = torch.cat([numbers, torch.tensor([math.log(focal_mm)] if free_focal else []).double()])
     known = torch.tensor(
         [1 / _TILT_SPREAD_DEG if one.name.startswith("camera.") else 0.0 for one in filling.moving]
-        + ([1 / _FOCAL_SPREAD] if free_focal else [])
+        + ([1 / FOCAL_SPREAD] if free_focal else [])
     ).double()
     return covariance_of(
         points_of,

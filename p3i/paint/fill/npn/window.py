@@ -18,7 +18,7 @@ from p3i.paint.fill.sources import Array, Floats, Ground, Mask, Source, hole_of,
 from p3i.paint.fill.stack import weighed
 from p3i.place.placed import Placed
 from p3i.size import Size
-from p3i.vision.image import Image, resized
+from p3i.vision.image import Image, resized, resized_from_photo
 from p3i.vision.sheet import project
 from p3i.vision.warp import pixel_grid, taken
 
@@ -101,8 +101,7 @@ def window_of(photo: Image, placed: Placed, part: Mask, *, working_px: int) -> W
     everywhere = np.ones(part.shape, bool)
     small, marked = (resized(Image(values, everywhere), longer) for values in (photo.pixels, masks))
     known, hidden = marked.pixels[:, :, 0] > 0.999, marked.pixels[:, :, 1] > 0
-    move = 0.5 * scale - 0.5
-    from_photo = np.array([[scale, 0, move], [0, scale, move], [0, 0, 1]])
+    from_photo = resized_from_photo(scale)
     laid = dataclasses.replace(placed, size=small.size, image_from_plane=from_photo @ placed.image_from_plane)
     ground = Ground.of(small.pixels, known)
     own = hole_of(_pixels_of(hidden), small.pixels, known, laid)
