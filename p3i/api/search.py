@@ -198,7 +198,7 @@ def examples(
 def without(
     image: "Image", *, mask: "str | os.PathLike[str] | np.ndarray | None", roi: Polygon | None
 ) -> "Image":
-    """`image` with what `mask` marks, and what lies outside `roi`, made unknown."""
+    """`image` with what `mask` (bool [H, W], or a file) marks and what lies outside `roi` made unknown."""
     if mask is None and roi is None:
         return image
     import cv2

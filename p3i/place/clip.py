@@ -12,13 +12,13 @@ _NEAR = 0.02
 
 
 def cut_before_camera(polygon: np.ndarray, image_from_plane: np.ndarray) -> np.ndarray:
-    """The part of a polygon of the plane that lies in front of the camera."""
+    """The part of a polygon [K, 2] of the plane that lies in front of the camera of a homography [3, 3]."""
     depth = polygon @ image_from_plane[2, :2] + image_from_plane[2, 2]
     return cut_polygon(polygon, depth - _NEAR * image_from_plane[2, 2])
 
 
 def clipped_to_canvas(polygon: np.ndarray, size: Size) -> np.ndarray:
-    """The part of a polygon (pixels) that lies on the photo, out to the edge of its outermost pixels."""
+    """The part of a polygon [K, 2] (pixels) that lies on the photo, out to its outermost pixels' edge."""
     for axis, last in ((0, size.width - 1), (1, size.height - 1)):
         polygon = cut_polygon(polygon, polygon[:, axis] + 0.5)
         polygon = cut_polygon(polygon, last + 0.5 - polygon[:, axis])

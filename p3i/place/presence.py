@@ -67,7 +67,7 @@ def presence_of(placed: Placed, photo: Image, index: np.ndarray) -> Array:
 
 
 def sheet_of(placed: Placed, photo: Image, chart: Chart, index: np.ndarray) -> Sheet | None:
-    """The cells of `index` and those between and around them, side by side; None where they are too many."""
+    """The cells at `index` [N, 2], those between and around too, side by side; None for too many."""
     box = _box(chart, index)
     side = int(np.clip(np.sqrt(_SAMPLES / box.count) // 2 * 2, 0, _SIDES[1]))
     if side < _SIDES[0]:

@@ -32,6 +32,20 @@ def functions(path: Path) -> Iterator[ast.FunctionDef]:
 
 
 CASES = [(path, node) for path in sorted(FOLDER.glob("*.py")) for node in functions(path)]
+ELSEWHERE = [
+    (path, node)
+    for part in ("interp", "search", "place", "export", "paint", "api")
+    for path in sorted((FOLDER.parent / part).rglob("*.py"))
+    for node in functions(path)
+    if not node.name.startswith("_")
+]
+
+
+@pytest.mark.parametrize(("path", "node"), ELSEWHERE, ids=lambda value: getattr(value, "name", ""))
+def test_a_public_function_on_arrays_tells_their_shapes_in_every_part(
+    path: Path, node: ast.FunctionDef
+) -> None:
+    assert re.search(r"\[[^\[\]]+\]", ast.get_docstring(node) or ""), f"{path}: {node.name} tells no shape"
 
 
 def test_the_alphabet_is_written_down() -> None:

@@ -137,7 +137,7 @@ def evenly(count: int, most: int) -> list[int]:
 
 
 def as_gif(pictures: Sequence[tuple[np.ndarray, int]]) -> bytes:
-    """The frames as one animated GIF that runs for ever."""
+    """Frames, each uint8 [H, W, 3] with its milliseconds, as one animated GIF that runs for ever."""
     # One palette for all frames keeps the photo still while the drawing moves.
     few = [pictures[place][0] for place in evenly(len(pictures), 5)]
     palette = Pil.fromarray(np.concatenate(few)).quantize(_COLOURS_IN_ALL)

@@ -26,7 +26,7 @@ _SHIFT = 4
 
 
 def paint(scene: Scene) -> np.ndarray:
-    """The pixels of a scene."""
+    """The pixels of a scene: uint8 [H, W, 3], or [H, W, 4] where it has no paper."""
     channels = 3 if scene.paper is not None else 4
     canvas = np.zeros((scene.size.height, scene.size.width, channels), np.uint8)
     if scene.paper is not None:

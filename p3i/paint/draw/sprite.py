@@ -48,7 +48,7 @@ def premultiplied(pixels: np.ndarray, alpha: np.ndarray) -> np.ndarray:
 
 
 def plain(layer: np.ndarray) -> np.ndarray:
-    """Premultiplied RGBA float -> uint8 with plain alpha."""
+    """Premultiplied RGBA float [H, W, 4] in 0..1 -> uint8 [H, W, 4] with plain alpha."""
     alpha = layer[:, :, 3:]
     colour = layer[:, :, :3] / np.maximum(alpha, 1e-6)
     return np.rint(255 * np.clip(np.concatenate([colour, alpha], axis=2), 0, 1)).astype(np.uint8)

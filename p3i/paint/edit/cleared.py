@@ -72,7 +72,7 @@ def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> A
 def object_masks(
     placed: Placed, cut: Cutout, *, wider: float = 1.0
 ) -> Iterator[tuple[tuple[slice, slice], Floats]]:
-    """For each object in sight its window and how much of each pixel it covers; `wider` scales it."""
+    """For each object in sight its window and how much of each pixel it covers [h, w]; `wider` scales it."""
     plane_from_image = np.linalg.inv(placed.image_from_plane)
     half = (cut.alpha.shape[0] - 1) / 2
     grid_from_local = np.diag([1 / (cut.step * wider), 1 / (cut.step * wider), 1.0])

@@ -40,7 +40,9 @@ def even() -> Light:
 def fitted_light(samples: np.ndarray, seen: np.ndarray, points: np.ndarray) -> Light:
     """The gain that makes the patches most alike: quadratic for eight patches or more, linear for three.
 
-    Least squares of logarithms, places against their own mean over the patches, outliers weighed down.
+    `samples` [N, K, 3] are the colours at K places of N patches, `seen` [N, K] says which are known, `points`
+    [N, K, 2] where they lie on the plane. Least squares of logarithms, places against their own mean over
+    the patches, outliers weighed down.
     """
     count = len(samples)
     terms = 5 if count >= 8 else 2 if count >= 3 else 0

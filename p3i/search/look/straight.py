@@ -52,5 +52,5 @@ def straightened(image: Image, k1: float) -> Straightened:
 
 
 def shifted(points_px: torch.Tensor, canvas: Size, photo: Size) -> torch.Tensor:
-    """Points on the straightened canvas as points on the photo's, which has the same middle."""
+    """Points [..., 2] on the straightened canvas as points on the photo's, which has the same middle."""
     return points_px - points_px.new_tensor(canvas.middle) + points_px.new_tensor(photo.middle)

@@ -23,7 +23,7 @@ _FREE = ("steps", "time_s", "device", "threads", "checkpoint")
 
 
 def fingerprint(photo: Image, placed: Placed, hole: np.ndarray, options: NetworkOptions) -> str:
-    """Names all that a training depends on. What the hole hides does not count."""
+    """Names all that a training depends on. What the `hole` [H, W] hides does not count."""
     digest = hashlib.sha256()
     known = photo.valid & ~hole
     for array in (photo.pixels * known[:, :, None], known, placed.image_from_plane, placed.points):
