@@ -6,7 +6,7 @@ Imports neither torch nor numpy.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
@@ -15,6 +15,8 @@ NEEDED = 0.13
 """The score that suffices for an answer (docs/benchmarks.md says what it was calibrated on)."""
 
 StructureFound = Literal["lattice", "circular", "hybrid"]
+STRUCTURES: tuple[StructureFound, ...] = get_args(StructureFound)
+"""In the order of Table 1, in which they are looked for."""
 FocalSource = Literal["option", "header", "exif", "default", "pattern"]
 
 FOCAL_REASONS: Mapping[FocalSource, str] = {

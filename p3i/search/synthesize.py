@@ -1,36 +1,35 @@
-"""Photo -> program: the whole search, from what may be looked at to the answer or the reason for none."""
+"""Photo -> program: every sketch in turn, its guesses fitted, drawn and judged, until none has room left."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
-from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
 from p3i.search.config import SearchConfig
-from p3i.search.families import FAMILIES
-from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
+from p3i.search.extent.drawn import drawn
+from p3i.search.extent.layout import proposed, supported
+from p3i.search.fit.best import Best
+from p3i.search.fit.fitted import Drawn, Fit
+from p3i.search.fit.fitting import certain, fit_places, holds, worth
+from p3i.search.fit.same import same_lattice, says_already
+from p3i.search.forms.asked import asks_for_itself, check_asked, needed_for
+from p3i.search.forms.guess import Guess
+from p3i.search.forms.sketches import Sketched, sketches
+from p3i.search.judge.answered import answers_of
 from p3i.search.judge.bits import by_explained
-from p3i.search.judge.region import centers_px, region_px, share_in_sight
-from p3i.search.judge.same import distinct_answers
+from p3i.search.judge.elsewhere import with_note_of_others
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
-from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.lens import find_with_lens
-from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
-from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
-from p3i.search.result import (
-    FOCAL_REASONS,
-    Candidate,
-    FocalSource,
-    StopReason,
-    SynthesisResult,
-)
-from p3i.search.table1 import unwritable_note, within_table1
+from p3i.search.optics.paid_focal import with_paid_focal
+from p3i.search.outcome import focal_of, outcome, told
+from p3i.search.propose.proposers import Proposer, proposers, share_of_time
+from p3i.search.result import NEEDED, STRUCTURES, StopReason, SynthesisResult
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads
 
@@ -39,10 +38,12 @@ _LEAST_SIDE = 32
 _LEAST_KNOWN = 0.1
 # The spread of grey levels (0..1) below which a picture is flat.
 _LEAST_SPREAD = 0.004
-# Where a family has an answer of this score, no other kind of pattern could explain the photo better.
-_BEYOND_DOUBT = 0.3
-# A curve of which the photo shows less than this share was not seen.
-_LEAST_IN_SIGHT = 0.5
+# Once a fit is certain, so many more are tried without a better one, of guesses at least this promising; and
+# of the fits, only those with this share of the best one's worth are drawn once an answer is sure.
+_TRIES_WHEN_CERTAIN = 2
+_RIVAL = 0.5
+
+Fitted = tuple[Guess, Fit]
 
 
 def synthesize(
@@ -59,148 +60,131 @@ def synthesize(
     one, while that is being finished, is raised.
     """
     with limited_threads(config.threads):
-        return _searched(image, config, progress, trace)
+        assumed = focal_of(image, config)
+        if (hopeless := _hopeless(image)) is not None:
+            return told(config, assumed, None, hopeless)
+        check_asked(config, image.size)
+        look = Session(Evidence(image, config, assumed[0]), config, progress, trace and _in_text(trace))
+        width, height = image.size.width, image.size.height
+        look.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
+        answers = _searched(look) if config.lens is None else _searched_with_lens(look)
+        return look.completed(lambda: outcome(look, answers, assumed=assumed))
 
 
-def _searched(
-    image: Image, config: SearchConfig, progress: Progress | None, trace: Trace | None
-) -> SynthesisResult:
-    """`synthesize`, however many threads there are."""
-    assumed = focal_of(image, config)
-    hopeless = _hopeless(image)
-    if hopeless is not None:
-        return _told(config, assumed, None, hopeless)
-    check_asked(config, image.size)
-    session = Session(Evidence(image, config, assumed[0]), config, progress, trace and _in_text(trace))
-    width, height = image.size.width, image.size.height
-    session.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
-    answers = _found(session) if config.lens is None else _found_with_lens(session)
-    return session.completed(lambda: _result(session, answers, assumed=assumed))
-
-
-def _result(
-    session: Session, answers: list[Answer], *, assumed: tuple[float, FocalSource]
-) -> SynthesisResult:
-    """The best of the answers as the result of the search, or why none of them is one."""
-    config, image, focal_mm = session.config, session.evidence.image, assumed[0]
-    needed = needed_for(config)
-    if config.focal_mm == "auto":
-        answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
-    if config.strict:
-        answers = within_table1(session, answers)
-    told = with_printed_scores(session.evidence, answers, needed=needed)
-    sure = convincing(answers, told, needed=needed, fills=config.extent_used == "image")
-    # What a person asked for is theirs to choose, whatever it costs.
-    asked = asked_for(config) is not None
-    seen = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
-    good = seen if asked else [answer for answer in seen if answer.worth > 0]
-    if not good:
-        best = max((answer.score for answer in told), default=0.0)
-        reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
-        if session.unwritable and not sure:
-            reason = StopReason.OUTSIDE_TABLE_1
-        refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
-        session.record("answer", program=None, score=best, reason=refused.reason)
-        return refused
-    good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
-    first = good[0]
-    runner_up = max((answer.worth for answer in good[1:]), default=0.0)
-    margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
-    other = _mirrored(session, first)
-    sigma_deg = pose_sigma_deg(session.evidence, first)
-    doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
-    ambiguity = None if other is None else ambiguity_note(other)
-    notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
-    if config.extent_used == "image" and first.structure != "lattice":
-        notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
-    if session.unwritable - {first.structure}:
-        notes = (*notes, unwritable_note(session))
-    centers = centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1)
-    by_score = first.score >= needed
-    if not by_score and config.extent_used == "found":
-        notes = (*notes, faint_note(first, len(centers)))
-    session.tell("done", 1.0)
-    session.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
-    return _told(
-        config,
-        assumed,
-        first.program,
-        session.stopped or StopReason.FOUND,
-        structure=first.structure,
-        score=first.score,
-        margin=margin,
-        needed=needed if by_score else None,
-        false_alarms=false_alarms(first.structure, first.worth),
-        candidates=tuple(
-            Candidate(
-                program=answer.program,
-                score=answer.score,
-                structure=answer.structure,
-                false_alarms=false_alarms(answer.structure, answer.worth),
-                **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
-            )
-            for answer in good[: config.top]
-        ),
-        centers=centers,
-        region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
-        lens_k1=first.lens_k1,
-        pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
-        mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
-        notes=notes,
-        **_focal_facts(first, assumed),
-    )
-
-
-def _told(
-    config: SearchConfig,
-    assumed: tuple[float, FocalSource],
-    program: Program | None,
-    stop: StopReason,
-    **more: object,
-) -> SynthesisResult:
-    """A result with the facts that every one has, and `more`."""
-    told = {**_focal_facts(None, assumed), "features": config.features_used, "seed": config.seed, **more}
-    return SynthesisResult(program=program, stop=stop, **told)  # pyright: ignore[reportArgumentType]
-
-
-def _found(session: Session) -> list[Answer]:
-    """What every family that is asked for finds, the most worth first; an interrupt ends the search."""
-    answers: list[list[Answer]] = []
-    with session.until_interrupted():
-        asked = asked_for(session.config)
-        if asked is not None:
-            answers.append(asked(session))
-        for family in FAMILIES if asked is None else ():
-            beyond_doubt = any(
-                answer.score > _BEYOND_DOUBT and answer.structure != family.starts_from
-                for found in answers
-                for answer in found
-            )
-            if answers and not session.go_on():
+def _searched(look: Session) -> list[Answer]:
+    """The answers that the options ask for, the most worth first; an interrupt ends the search with them."""
+    best = Best()
+    spoken: set[Proposer] = set()
+    begun = False
+    with look.until_interrupted():
+        for sketch in sketches(look.config):
+            if begun and not look.go_on():
                 break
-            if session.config.structure == family.structure or (
-                session.config.structure == "auto" and not beyond_doubt
-            ):
-                answers.append(family.find(session))
-        if session.config.exhaustive_s is not None and session.go_on():
-            answers.append(walk(session))
-    return session.completed(
-        lambda: by_explained(session.evidence, answers, needed=needed_for(session.config))
-    )
+            if not best.leaves_room_for(sketch):
+                continue
+            for proposer in proposers(look.config):
+                if sketch.shape in proposer.writes and proposer not in spoken:
+                    spoken |= {proposer} if proposer.all_at_once else set()
+                    _take_up(look, sketch, proposer, best)
+            begun |= sketch.asked
+    return look.completed(lambda: _by_worth(look, best))
 
 
-def _found_with_lens(session: Session) -> list[Answer]:
+def _take_up(look: Session, sketch: Sketched, proposer: Proposer, best: Best) -> None:
+    """Fill a sketch: fit the guesses of each round, draw the best of the fits, and judge what is drawn."""
+    look.record("sketch", name=sketch.name, bits=sketch.bits)
+    with look.until_interrupted(), look.within(share_of_time(look.config, sketch)):
+        for guesses in proposer.rounds(look, sketch, best):
+            fits = _fitted(look, guesses, most=proposer.most_fitted)
+            best.fits += [fit for _, fit in fits]
+            for guess, fit in _rivals(look, fits, sketch, best, most=proposer.most_drawn):
+                look.tell("reading off the objects", 0.8)
+                found = look.completed(partial(_drawn, look, sketch, guess, fit))
+                if found is not None:
+                    best.add(sketch, found, look.completed(partial(answers_of, look, sketch, found)))
+                    look.record("candidate", program=found.program, score=found.sure, worth=worth(found.fit))
+
+
+def _drawn(look: Session, sketch: Sketched, guess: Guess, fit: Fit) -> Drawn | None:
+    """What a fit draws, a ring with its own focal where that pays for itself."""
+    ring = sketch.structure == "circular" and sketch.by_hand is None
+    return drawn(look, sketch, with_paid_focal(look, fit) if ring else fit, guess.base)
+
+
+def _fitted(look: Session, guesses: Iterable[Guess], *, most: int) -> list[Fitted]:
+    """The guesses fitted, the most worth first, until time is up or a fit is certain."""
+    fits: list[Fitted] = []
+    tried = idle = 0
+    with look.until_interrupted():
+        for guess in guesses:
+            if tried >= most or (tried and not look.go_on()):
+                break
+            sure = any(certain(fit) for _, fit in fits)
+            if sure and guess.promise < _RIVAL:
+                continue
+            if any(says_already(look.evidence, fit, guess) for _, fit in fits):
+                continue
+            look.record("proposal", program=look.trace and proposed(guess), promise=guess.promise)
+            look.tell("refining", 0.3 + 0.5 * tried / most)
+            fit = look.completed(partial(fit_places, look, guess))
+            tried += fit is not None
+            if fit is None or not holds(fit, guess):
+                continue
+            idle = 0 if all(worth(fit) > worth(other) for _, other in fits) else idle + 1
+            fits.append((guess, fit))
+            look.record("fit", program=look.trace and supported(fit), score=fit.mean, worth=worth(fit))
+            if idle >= _TRIES_WHEN_CERTAIN and any(certain(fit) for _, fit in fits):
+                break
+    return sorted(fits, key=lambda one: -worth(one[1]))
+
+
+def _rivals(
+    look: Session, fits: list[Fitted], sketch: Sketched, best: Best, *, most: int
+) -> Iterator[Fitted]:
+    """The fits to draw, the best first: once an answer is sure, only what could still be a better one."""
+    done: list[Fit] = []
+    top = look.config.top
+    for guess, fit in fits:
+        if len(done) >= max(most, top) or (done and not look.go_on()):
+            return
+        answers = best.of(sketch)
+        if sketch.by_hand is None and any(answer.score >= NEEDED for answer in answers):
+            if len(answers) >= top and worth(fit) < _RIVAL * worth(done[0]):
+                return
+            if any(same_lattice(look.evidence, fit, other) for other in done):
+                continue
+        done.append(fit)
+        yield guess, fit
+
+
+def _by_worth(look: Session, best: Best) -> list[Answer]:
+    """The answers by the bits that they explain; each structure's in its own order, the most worth first."""
+    asked = sorted(best.asked(), key=lambda answer: -answer.worth)
+    groups = [[one for one in asked if one.structure == structure] for structure in STRUCTURES]
+    answers = by_explained(look.evidence, groups, needed=needed_for(look.config))
+    if asks_for_itself(look.config):
+        return answers
+    return with_note_of_others(look, best.fits, answers, finish=_finished)
+
+
+def _finished(look: Session, fit: Fit) -> Answer | None:
+    """A lattice that was fitted, as an answer."""
+    found = drawn(look, sketches(SearchConfig(structure="lattice"))[0], fit, None)
+    return None if found is None else Answer(found.program, "lattice", found.sure, worth(found.fit))
+
+
+def _searched_with_lens(look: Session) -> list[Answer]:
     """What is found through the lens of the options; once interrupted, what the photo as it is had shown."""
     plain: list[Answer] = []
 
     def search(inner: Session) -> list[Answer]:
-        found = _found(inner)
-        if inner is session:
+        found = _searched(inner)
+        if inner is look:
             plain[:] = found
         return found
 
-    with session.until_interrupted():
-        return find_with_lens(session, search)
+    with look.until_interrupted():
+        return find_with_lens(look, search)
     return plain
 
 
@@ -213,47 +197,6 @@ def _in_text(trace: Trace) -> Trace:
         trace({**step, "program": text} if "program" in step else step)
 
     return told
-
-
-def _in_sight(session: Session, answer: Answer) -> bool:
-    """Whether the photo shows at least half of the objects of a curve, which it would be the evidence of.
-
-    The box of indices of a lattice that stands askew to the frame has half of its corners outside.
-    """
-    if answer.structure == "lattice":
-        return True
-    focal_mm = answer.focal_mm or session.evidence.focal_mm
-    shown = share_in_sight(answer.program, session.evidence.image, focal_mm, lens_k1=answer.lens_k1)
-    return shown >= _LEAST_IN_SIGHT
-
-
-def _mirrored(session: Session, answer: Answer) -> Camera | None:
-    """The other tilt that a ring leaves open; more than one circle tells the tilt, and no time is no look."""
-    if answer.structure != "circular" or answer.lens_k1 is not None or session.stopped is not None:
-        return None
-    with session.until_interrupted():
-        return mirrored_camera(session.evidence, answer)
-    return None
-
-
-def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
-    """The focal that is assumed, and why: the option, a sketch's header, the photo's EXIF data, or 35 mm."""
-    if config.focal_mm is not None and config.focal_mm != "auto":
-        return config.focal_mm, "option"
-    if (stated := stated_focal(config)) is not None:
-        return stated, "header"
-    if image.focal_mm is not None:
-        return image.focal_mm, "exif"
-    return 35.0, "default"
-
-
-def _focal_facts(answer: Answer | None, assumed: tuple[float, FocalSource]) -> dict[str, object]:
-    """The focal of an answer, its source and the reason, as fields of a result; None is told as assumed."""
-    mm, source = assumed
-    if answer is not None and answer.focal_mm is not None:
-        mm, source = answer.focal_mm, "pattern"
-    reason = answer.focal_reason if answer is not None else ""
-    return {"focal_mm": mm, "focal_source": source, "focal_reason": reason or FOCAL_REASONS[source]}
 
 
 def _hopeless(image: Image) -> StopReason | None:

@@ -18,7 +18,7 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.fit.places import CurveFit
+from p3i.search.fit.places import Fit
 from p3i.search.hybrids import (
     _drawn_once,
     _evenly_sure,
@@ -85,12 +85,12 @@ def test_a_fan_is_found_from_its_inner_ring_though_the_outer_draws_lie_far_apart
     assert apart.min(1).max() < 10
 
 
-def rings_with(*contrasts: list[float]) -> CurveFit:
+def rings_with(*contrasts: list[float]) -> Fit:
     """A fit of a row of rings of five whose objects in sight agree so well."""
     filling = hybrid_filling(replace(PROPOSAL, first=0, last=2, count=5, counted_by_ring=False))
     index = [(i, j) for i, ring in enumerate(contrasts) for j in range(len(ring))]
     together = torch.tensor([one for ring in contrasts for one in ring])
-    return CurveFit(filling, torch.zeros(0), 35.0, 1.0, torch.tensor(index).double(), together)
+    return Fit(filling, torch.zeros(0), 35.0, 1.0, torch.tensor(index).double(), together)
 
 
 def test_a_ring_of_which_two_objects_are_in_sight_makes_no_hybrid() -> None:
@@ -114,7 +114,7 @@ def test_a_ring_laid_over_its_own_objects_makes_no_hybrid(step: float, once: boo
     values = dict.fromkeys((unknown.name for unknown in filling.moving), 0.0)
     z = numbers_of(filling, values | {"draw.x.radius.1": 24.0, "draw.x.offset.i": step})
     index = filling.pattern.index.double()
-    assert _drawn_once(CurveFit(filling, z, 35.0, 24.0, index, torch.ones(len(index)))) == once
+    assert _drawn_once(Fit(filling, z, 35.0, 24.0, index, torch.ones(len(index)))) == once
 
 
 def test_an_empty_ring_about_the_centre_is_left_out_and_one_with_objects_stays() -> None:

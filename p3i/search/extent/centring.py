@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from p3i.interp.camera import project
-from p3i.search.fit.places import CurveFit, measured
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.places import measured
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import Frames, frames, offsets_grid, sample_px
 from p3i.vision.warp import sample, sample_valid
@@ -35,7 +36,7 @@ class _MeanPatch:
     saliency: Tensor
 
 
-def centred(evidence: Evidence, fit: CurveFit) -> CurveFit:
+def centred(evidence: Evidence, fit: Fit) -> Fit:
     """The fit with its draws in the middle of their objects, as far as its free numbers allow."""
     now = fit
     for _ in range(_TURNS):
@@ -51,7 +52,7 @@ def centred(evidence: Evidence, fit: CurveFit) -> CurveFit:
     return now
 
 
-def standing_out(evidence: Evidence, fit: CurveFit) -> float:
+def standing_out(evidence: Evidence, fit: Fit) -> float:
     """How much the middle of the mean patch differs from the ground, against what lies around it.
 
     Between the objects of a pattern patches look alike as well; there it is less than on the objects.
@@ -65,7 +66,7 @@ def _lead(patch: _MeanPatch) -> float:
     return float(patch.saliency[near].mean()) / (float(patch.saliency[~near].mean()) + 1e-9)
 
 
-def _mean_patch(evidence: Evidence, fit: CurveFit, where: Frames) -> _MeanPatch:
+def _mean_patch(evidence: Evidence, fit: Fit, where: Frames) -> _MeanPatch:
     offsets = _WIDE * offsets_grid(_COUNT, samples_a_side=_COUNT).reshape(-1, 2)
     matrix = fit.filling.pattern.image_from_plane(fit.theta, size=evidence.image.size, focal_mm=fit.focal_mm)
     colours = evidence.colours_for(sample_px(matrix, where))
@@ -92,7 +93,7 @@ def _middle(patch: _MeanPatch) -> Tensor | None:
     return middle if float(middle.norm()) < _MOST else None
 
 
-def _moved(fit: CurveFit, targets: Tensor) -> Tensor:
+def _moved(fit: Fit, targets: Tensor) -> Tensor:
     """The numbers z [F] that draw closest to `targets` [N, 2] (program units) under the same camera."""
     filling = fit.filling
     free = torch.tensor(

@@ -13,11 +13,14 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.extent.phase import find_phase
 from p3i.search.extent.presence import find_extent
-from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.grow import sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
 from p3i.search.fit.robust import fit_instances
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
+from p3i.search.forms.guess import Guess
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
+from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
 from p3i.search.look.correlate import find_instances
@@ -32,6 +35,8 @@ _SIDE = 16
 _MOST_REFITTED = 300
 _FEWEST_REFITTED = 6
 _REFITS = 3
+# A proposal is shown so many steps to each side.
+_SHOWN = (-6, 7)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +83,22 @@ class Layout:
         return Program(pose, For("i", Affine(constant=i_start), Affine(constant=i1 - i_skip), inner))
 
 
+def proposed(guess: Guess) -> Program:
+    """A guess as a program to show: a lattice's says nothing of its extent."""
+    if guess.filling is not lattice_filling():
+        return guess.program()
+    return Layout(guess.lattice, _SHOWN, _SHOWN).program()
+
+
+def supported(fit: Fit) -> Program:
+    """A fit as a program to show: a lattice's over the box of its support."""
+    if fit.filling is not lattice_filling() or not bool(fit.support.any()):
+        return fit.program()
+    cells = fit.index[fit.support].int()
+    low, high = cells.amin(0).tolist(), (cells.amax(0) + 1).tolist()
+    return Layout(Lattice.of(fit.pattern, fit.theta), (low[0], high[0]), (low[1], high[1])).program()
+
+
 def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:
     """The objects of a lattice whose cells `ground` [N, 2] are sure: phase and extent from the photo.
 
@@ -98,11 +119,12 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
     return Layout(lattice, found.i_range, found.j_range, found.guards)
 
 
-def filling_layout(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
+def filling_layout(evidence: Evidence, layout: Layout) -> Layout:
     """The layout continued over the whole picture, as the paper assumes (section 3.4).
 
     All objects whose middle lies in the picture are drawn, also those whose cell the frame cuts.
     """
+    pattern = lattice_filling().pattern
     theta = layout.lattice.theta(pattern)
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
     cells = cells_in_view(level, pattern, theta, most=4000)
@@ -157,12 +179,13 @@ def _drawn_cells(
     return index[torch.from_numpy(layout.holds(index.numpy()))]
 
 
-def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
+def refitted(evidence: Evidence, layout: Layout) -> Layout:
     """The layout with camera and lattice fitted once more, to its own objects only and on the fine map.
 
     What the fit grew on had cells cut anywhere and some beyond the pattern; now each cell holds an object.
     Objects at the frame count too: they lie farthest apart, and that fixes the pose.
     """
+    pattern = lattice_filling().pattern
     theta = layout.lattice.theta(pattern)
     side = side_of_middle(evidence, pattern, layout)
     level = evidence.level_for(_SHARPER * side, finest=True)

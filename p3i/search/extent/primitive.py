@@ -16,7 +16,8 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.fit.grow import Fit, side_of_cell
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.grow import side_of_cell
 from p3i.search.forms.lattice import Lattice, reduce_basis
 from p3i.search.look.cells import (
     Cells,

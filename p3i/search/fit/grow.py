@@ -6,7 +6,6 @@ precise as the distances get long.
 """
 
 import itertools
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -16,8 +15,9 @@ from torch import Tensor
 from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
 from p3i.search.fit.features import refine
+from p3i.search.fit.fitted import SUPPORT, Fit
 from p3i.search.fit.robust import fit_instances
-from p3i.search.forms.guess import Proposal, tilted
+from p3i.search.forms.guess import Guess, tilted
 from p3i.search.forms.lattice import (
     PHASE,
     Lattice,
@@ -26,13 +26,11 @@ from p3i.search.forms.lattice import (
     cells_in_view,
     map_from_index,
 )
+from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.cells import HALF_STEPS, agreement, contrast, mean_cell, read_cells, sample_grid
 from p3i.search.look.correlate import find_instances
 from p3i.search.look.evidence import Evidence, Level
 
-# A cell belongs to the pattern where the others predict it this much better than at half steps; the same
-# figure is taken off before cells are summed, so that many doubtful cells make no pattern.
-SUPPORT = 0.12
 # Growth looks this many cells beyond those that agree.
 _REACH = 2
 _ROUNDS = 9
@@ -41,25 +39,6 @@ _MOST_REFINED = 160
 # The tilts under which a proposal without one is tried.
 _TILTS_DEG = (0.0, 35.0, 55.0)
 _FEWEST = 4
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fit:
-    """A refined pattern on a photo.
-
-    `index` [N, 2] are the cells in view, `contrast` [N] how well each is predicted by the others beyond half
-    steps; `score` is the sum of what is predicted beyond SUPPORT, by their shares of the picture.
-    """
-
-    theta: Tensor
-    index: Tensor
-    contrast: Tensor
-    score: float
-
-    @property
-    def support(self) -> Tensor:
-        """Which of the cells belong to the pattern, [N] bool."""
-        return self.contrast > SUPPORT
 
 
 def measure(level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | None = None) -> Fit | None:
@@ -80,14 +59,14 @@ def weighed(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, contra
     area, _ = cell_areas(map_from_index(level, pattern, theta), index, level)
     share = (area / (level.size.width * level.size.height)).float()
     score = float((share * (contrast - SUPPORT).clamp(min=0)).sum())
-    return Fit(theta, index, contrast, score)
+    filling = lattice_filling()
+    return Fit(filling, filling.z_of(theta), level.focal_mm, 0.0, index, contrast, covered=score)
 
 
-def grow(
-    evidence: Evidence, pattern: Pattern, proposal: Proposal, *, generator: torch.Generator
-) -> Fit | None:
-    """Refine a proposal and follow it as far as the pattern goes; None where there is nothing to follow."""
-    start = _seed(evidence, pattern, proposal)
+def grow(evidence: Evidence, guess: Guess, *, generator: torch.Generator) -> Fit | None:
+    """Refine a guess and follow it as far as the pattern goes; None where there is nothing to follow."""
+    pattern = guess.filling.pattern
+    start = _seed(evidence, pattern, guess)
     if start is None:
         return None
     theta, selected, weights = start
@@ -116,7 +95,7 @@ def follow(
         fit = measure(level, pattern, theta, start=selected)
         if fit is None:
             break
-        if best is None or fit.score > best.score:
+        if best is None or fit.covered > best.covered:
             best = fit
         selected, weights = _grown(fit, selected)
         now = {tuple(cell) for cell in selected.tolist()}
@@ -133,11 +112,11 @@ def follow(
     return best
 
 
-def _seed(evidence: Evidence, pattern: Pattern, proposal: Proposal) -> tuple[Tensor, Tensor, Tensor] | None:
+def _seed(evidence: Evidence, pattern: Pattern, guess: Guess) -> tuple[Tensor, Tensor, Tensor] | None:
     """Where to start: theta, cells [N, 2] and their weights [N]."""
-    if proposal.local:
-        return _local_seed(evidence, pattern, proposal)
-    theta = proposal.lattice.reduced().theta(pattern)
+    if guess.local:
+        return _local_seed(evidence, pattern, guess)
+    theta = guess.lattice.reduced().theta(pattern)
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
     index = cells_in_view(level, pattern, theta)
     if len(index) < _FEWEST:
@@ -151,11 +130,9 @@ def _seed(evidence: Evidence, pattern: Pattern, proposal: Proposal) -> tuple[Ten
     return theta, (index - middle)[near], support[near].clamp(min=1e-3)
 
 
-def _local_seed(
-    evidence: Evidence, pattern: Pattern, proposal: Proposal
-) -> tuple[Tensor, Tensor, Tensor] | None:
+def _local_seed(evidence: Evidence, pattern: Pattern, guess: Guess) -> tuple[Tensor, Tensor, Tensor] | None:
     """The tilt under which the neighbourhood of a local proposal agrees best, and its middle cells."""
-    flat = proposal.lattice.theta(pattern)
+    flat = guess.lattice.theta(pattern)
     level = evidence.level_for(side_of_cell(evidence, pattern, flat))
     steps = torch.arange(-3, 4, dtype=torch.float64)
     index = torch.cartesian_prod(steps, steps)
@@ -163,9 +140,7 @@ def _local_seed(
     grid = sample_grid()
     best: tuple[float, Tensor] | None = None
     for rx_deg, ry_deg in _tilts():
-        seen = tilted(
-            proposal, rx_deg=rx_deg, ry_deg=ry_deg, focal_mm=evidence.focal_mm, size=level.photo_size
-        )
+        seen = tilted(guess, rx_deg=rx_deg, ry_deg=ry_deg, focal_mm=evidence.focal_mm, size=level.photo_size)
         theta = seen.lattice.theta(pattern)
         cells = read_cells(level, pattern, theta, index, grid)
         mean, _ = mean_cell(cells, torch.ones(len(index)))

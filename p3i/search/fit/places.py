@@ -5,17 +5,19 @@ program's free numbers, the focal among them where it is free, are fitted to the
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from p3i.interp.camera import project
+from p3i.search.fit.fitted import Fit
 from p3i.search.fit.robust import robust_fit
 from p3i.search.forms.filling import Filling
-from p3i.search.look.contrast import mean_contrast, placed_right, score_of_curve
+from p3i.search.look.contrast import score_of_curve
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
+from p3i.search.look.session import Session
 
 FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
@@ -31,41 +33,9 @@ MOST_ZOOM = 0.15
 _FEWEST = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CurveFit:
-    """A filled sketch on a photo: its free numbers `z` [F], the focal (mm), and how its objects agree.
-
-    `index` [N, 2] are the objects in sight, `contrast` [N] how well each is predicted by the others beyond
-    half a step, `side` the patches' side in program units; `cost` the robust misfit of the objects' places.
-    """
-
-    filling: Filling
-    z: Tensor
-    focal_mm: float
-    side: float
-    index: Tensor
-    contrast: Tensor
-    cost: float = math.inf
-
-    @property
-    def theta(self) -> Tensor:
-        """The numbers of the generator, [P]."""
-        return self.filling.theta(self.z)
-
-    @property
-    def mean(self) -> float:
-        """The mean contrast: `mean_contrast`."""
-        return mean_contrast(self.contrast)
-
-    @property
-    def quality(self) -> float:
-        """The mean contrast, less where the objects do not stand where the program draws."""
-        return placed_right(self.mean, self.cost)
-
-
 def measured(
     evidence: Evidence, filling: Filling, z: Tensor, *, focal_mm: float, side: float | None = None
-) -> CurveFit | None:
+) -> Fit | None:
     """How well the objects of a filled sketch, z [F], predict each other; None for fewer than three."""
     theta = filling.theta(z)
     pattern = filling.pattern
@@ -75,12 +45,12 @@ def measured(
     if len(index) < _FEWEST:
         return None
     found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
-    return CurveFit(filling, z, focal_mm, side, index, found.contrast)
+    return Fit(filling, z, focal_mm, side, index, found.contrast)
 
 
 def registered(
-    evidence: Evidence, fit: CurveFit, *, free_focal: bool = False, keep_side: bool = False
-) -> CurveFit | None:
+    evidence: Evidence, fit: Fit, *, free_focal: bool = False, keep_side: bool = False
+) -> Fit | None:
     """One round: find the objects around their places, fit the numbers to where they are; None if too few.
 
     `keep_side`: the patches stay as wide as they are, whatever becomes of the distance of the draws.
@@ -143,8 +113,8 @@ def registered(
 
 
 def follow(
-    evidence: Evidence, fit: CurveFit, *, rounds: int, free_focal: bool = False, keep_side: bool = False
-) -> CurveFit:
+    evidence: Evidence, fit: Fit, *, rounds: int, free_focal: bool = False, keep_side: bool = False
+) -> Fit:
     """The best of some rounds of registration; the options are those of `registered`."""
     best = now = fit
     for _ in range(rounds):
@@ -160,12 +130,29 @@ def follow(
     return best
 
 
-def curve_score(fit: CurveFit) -> float:
+def fitted(
+    look: Session, filling: Filling, values: dict[str, float], *, focal_mm: float, rounds: int
+) -> Fit | None:
+    """A filling fitted from the numbers of these names; None where too few of its objects are in sight."""
+    start = measured(look.evidence, filling, numbers_of(filling, values), focal_mm=focal_mm)
+    return None if start is None else settled(look, start, rounds=rounds)
+
+
+def settled(look: Session, fit: Fit, *, rounds: int) -> Fit:
+    """Some rounds of registration, with the focal free where nobody stated it."""
+    if not look.focal_is_free:
+        return follow(look.evidence, fit, rounds=rounds)
+    if fit.focal_mm == look.evidence.focal_mm:
+        fit = follow(look.evidence, fit, rounds=rounds)
+    return follow(look.evidence, fit, rounds=3, free_focal=True)
+
+
+def curve_score(fit: Fit) -> float:
     """The score, 0 to 1, of a program that was fitted: `score_of_curve` of its quality."""
     return score_of_curve(fit.quality, len(fit.contrast))
 
 
-def values_of(fit: CurveFit) -> dict[str, float]:
+def values_of(fit: Fit) -> dict[str, float]:
     """The numbers of a fit by the names of their unknowns, such as draw.x.radius.1."""
     return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
 
@@ -175,7 +162,7 @@ def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:
     return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
 
 
-def _limits(fit: CurveFit) -> Tensor:
+def _limits(fit: Fit) -> Tensor:
     """The most that one step may move each free number and the logarithm of the focal, [F + 1]."""
     radius = max(float(fit.filling.pattern.centers(fit.theta).std(0).norm()), fit.side)
     limits = []

@@ -7,20 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
-from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.look.evidence import Level
 
-TEMPLATE = Program(
-    CameraPose(),
-    For(
-        "i",
-        Affine(),
-        Affine(constant=1),
-        For("j", Affine(), Affine(constant=1), Draw(Affine(i=1), Affine(j=1))),
-    ),
-)
 PHASE = frozenset({"draw.x.1", "draw.y.1"})
 """The numbers that shift all cells alike."""
 
@@ -91,11 +80,6 @@ class Lattice:
     def reduced(self) -> "Lattice":
         """The same points written with the one basis that `reduce_basis` picks."""
         return self.with_basis(reduce_basis(self.basis))
-
-
-def lattice_pattern() -> Pattern:
-    """The compiled lattice sketch; its theta is only a place to put a lattice's numbers."""
-    return compile(TEMPLATE)
 
 
 def reduce_basis(basis: np.ndarray) -> np.ndarray:

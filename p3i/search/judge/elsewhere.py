@@ -13,9 +13,8 @@ import numpy as np
 import torch
 
 from p3i.interp.camera import Camera
-from p3i.interp.pattern import Pattern
 from p3i.search.answer import Answer
-from p3i.search.fit.grow import Fit
+from p3i.search.fit.fitted import Fit
 from p3i.search.judge.region import centers_px, region_px
 from p3i.search.look.cells import sample_points
 from p3i.search.look.evidence import Evidence
@@ -29,11 +28,11 @@ _LEAST_SCORE = 0.02
 # ... and planes whose normals differ by more than this are two.
 _OTHER_PLANE_DEG = 8.0
 
-Finish = Callable[[Session, Pattern, Fit], Answer | None]
+Finish = Callable[[Session, Fit], Answer | None]
 
 
 def with_note_of_others(
-    session: Session, pattern: Pattern, fits: list[Fit], answers: list[Answer], *, finish: Finish
+    session: Session, fits: list[Fit], answers: list[Answer], *, finish: Finish
 ) -> list[Answer]:
     """The answers, the best first, of which the first says whether another pattern lies beside its own.
 
@@ -48,11 +47,11 @@ def with_note_of_others(
         if other.score >= NEEDED and _inside(region, _centers(evidence, other)) <= _MOST_INSIDE:
             return [_noted(evidence, first, other), *answers[1:]]
     for fit in fits:
-        if fit.score < _LEAST_SCORE or not session.go_on():
+        if fit.covered < _LEAST_SCORE or not session.go_on():
             break
-        if _inside(region, _cells_px(evidence, pattern, fit)) > _MOST_INSIDE:
+        if _inside(region, _cells_px(evidence, fit)) > _MOST_INSIDE:
             continue
-        other = finish(session, pattern, fit)
+        other = finish(session, fit)
         if other is not None and other.score >= NEEDED:
             return [_noted(evidence, first, other), *answers[1:]]
     return answers
@@ -82,10 +81,10 @@ def _centers(evidence: Evidence, answer: Answer) -> np.ndarray:
     return np.array(centers_px(answer.program, evidence.image, focal_mm)).reshape(-1, 4)[:, :2]
 
 
-def _cells_px(evidence: Evidence, pattern: Pattern, fit: Fit) -> np.ndarray:
+def _cells_px(evidence: Evidence, fit: Fit) -> np.ndarray:
     """The middles of the cells of a fit's support, [N, 2] pixels of what was looked at."""
     level = evidence.frame
-    points, _ = sample_points(level, pattern, fit.theta, fit.index[fit.support])
+    points, _ = sample_points(level, fit.pattern, fit.theta, fit.index[fit.support])
     back = torch.linalg.inv(level.map_from_photo)
     return (points @ back[:2, :2].T + back[:2, 2]).numpy()
 

@@ -24,9 +24,8 @@ class Session:
     """The photo's evidence, the options, the clock, and where progress and steps are told.
 
     `stopped` says why the search was cut short, if it was; who proposes and refines looks at `go_on()` in
-    between, and then finishes what it has. `rings` keeps what rings.py found, for the families that share it;
-    a session for other evidence (`replace`) begins without. `unwritable` are the structures of answers that
-    Table 1 has no words for, where only its programs are asked for.
+    between, and then finishes what it has. `unwritable` are the structures of answers that Table 1 has no
+    words for, where only its programs are asked for.
     """
 
     evidence: Evidence
@@ -34,10 +33,10 @@ class Session:
     progress: Progress | None = None
     trace: Trace | None = None
     stopped: StopReason | None = None
-    rings: tuple[Any, ...] | None = field(default=None, init=False)
     unwritable: set[StructureFound] = field(default_factory=set)
     _begun: float = field(default_factory=time.monotonic)
     _generator: torch.Generator | None = None
+    _until: float | None = None
 
     @property
     def generator(self) -> torch.Generator:
@@ -58,7 +57,16 @@ class Session:
         limit = self.config.time_s
         if self.stopped is None and limit is not None and time.monotonic() - self._begun > limit:
             self.stopped = StopReason.TIME_UP
-        return self.stopped is None
+        return self.stopped is None and (self._until is None or time.monotonic() < self._until)
+
+    @contextmanager
+    def within(self, seconds: float | None) -> Iterator[None]:
+        """A stretch of the search that has so many seconds of its own; None for no limit."""
+        self._until = None if seconds is None else time.monotonic() + seconds
+        try:
+            yield
+        finally:
+            self._until = None
 
     @contextmanager
     def until_interrupted(self) -> Iterator[None]:

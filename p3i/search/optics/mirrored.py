@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from p3i.grammar.leaves import leaves
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.fit.places import CurveFit, measured, numbers_of, registered, values_of
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.places import measured, numbers_of, registered, values_of
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.whole import whole_filling
 from p3i.search.look.evidence import Evidence
@@ -84,7 +85,7 @@ def ambiguity_note(camera: Camera) -> str:
     )
 
 
-def _fit(evidence: Evidence, filling: Filling, z: torch.Tensor, focal_mm: float) -> CurveFit | None:
+def _fit(evidence: Evidence, filling: Filling, z: torch.Tensor, focal_mm: float) -> Fit | None:
     """A few rounds of registration: the last, since where misfits are compared all have gone as far."""
     fit = measured(evidence, filling, z, focal_mm=focal_mm)
     for _ in range(_ROUNDS):
@@ -92,7 +93,7 @@ def _fit(evidence: Evidence, filling: Filling, z: torch.Tensor, focal_mm: float)
     return fit
 
 
-def _mirror_image(fit: CurveFit, camera: Camera, size: Size) -> torch.Tensor | None:
+def _mirror_image(fit: Fit, camera: Camera, size: Size) -> torch.Tensor | None:
     """The numbers [F] of the program that draws the same places, about, from the mirrored pose."""
     pattern = fit.filling.pattern
     plane = pattern.points_at(fit.index, fit.theta).numpy()

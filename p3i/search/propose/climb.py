@@ -12,7 +12,7 @@ from torch import Tensor
 
 from p3i.interp.camera import project
 from p3i.search.forms.filling import Filling, kept_within, start_values
-from p3i.search.forms.guess import Found
+from p3i.search.forms.guess import Guess
 from p3i.search.look.session import Session
 from p3i.search.propose.grid import BLUR_SHARES, PointMaps, distinct_share, samples, score_points
 
@@ -35,12 +35,12 @@ _SAME = 0.3
 
 def search_grid(
     session: Session, maps: PointMaps, filling: Filling, *, budget: int, keep: int
-) -> list[Found]:
+) -> list[Guess]:
     """The best fillings of one setting of the counts, at most `keep`, the best first."""
     if not filling.moving:
         z = torch.zeros(1, 0, dtype=torch.float64)
         score, setting = score_points(maps, filling, z, share=BLUR_SHARES[-1]).max(1)
-        return [Found(filling, z[0], int(setting), float(score))]
+        return [Guess(filling, z[0], float(score), setting=int(setting))]
     start = start_values(filling)
     if start is not None:  # near its goal already
         budget = max(1, budget // _STARTED)
@@ -59,12 +59,13 @@ def search_grid(
     return session.completed(lambda: _found(maps, filling, z))[:keep]
 
 
-def _found(maps: PointMaps, filling: Filling, z: Tensor) -> list[Found]:
+def _found(maps: PointMaps, filling: Filling, z: Tensor) -> list[Guess]:
     """The numbers z [K, F], each with its best setting, that draw at different places, the best first."""
     table = score_points(maps, filling, z, share=BLUR_SHARES[-1]) * distinct_share(filling, z)[:, None]
     score, setting = table.max(1)
-    found = [Found(filling, *row) for row in zip(z, setting.tolist(), score.tolist(), strict=True)]
-    return distinct(maps, sorted(found, key=lambda one: -one.score))
+    rows = zip(z, setting.tolist(), score.tolist(), strict=True)
+    found = [Guess(filling, numbers, value, setting=which) for numbers, which, value in rows]
+    return distinct(maps, sorted(found, key=lambda one: -one.promise))
 
 
 def _scored(session: Session, maps: PointMaps, filling: Filling, z: Tensor, *, share: float) -> Tensor:
@@ -138,9 +139,9 @@ def _descended(maps: PointMaps, filling: Filling, z: Tensor) -> Tensor:
     return z
 
 
-def distinct(maps: PointMaps, found: Sequence[Found]) -> list[Found]:
+def distinct(maps: PointMaps, found: Sequence[Guess]) -> list[Guess]:
     """Those that draw at other places than all before them."""
-    kept: list[tuple[Found, Tensor]] = []
+    kept: list[tuple[Guess, Tensor]] = []
     for one in found:
         theta = one.filling.theta(one.z)
         drawn = one.filling.pattern.centers(theta)[one.filling.masks[one.setting]]

@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from p3i.interp.camera import project
-from p3i.search.fit.places import CurveFit
+from p3i.search.fit.fitted import Fit
 from p3i.search.look.cells import agreement, mean_cell
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import Cells, Frames, frames, read, sample_px
@@ -80,7 +80,7 @@ class BaseRing:
     `fit` says what its objects look like, and the pose; `count` is how many objects it has itself.
     """
 
-    fit: CurveFit
+    fit: Fit
     center: Array
     radius: float
     phase_deg: float

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from p3i.interp.camera import image_from_plane
-from p3i.search.forms.guess import Proposal
+from p3i.search.forms.guess import Guess, lattice_guess
 from p3i.search.forms.lattice import Lattice, reduce_basis
 from p3i.search.look.evidence import FINE, Evidence, Level
 from p3i.search.propose.poses import pose_grid
@@ -33,8 +33,8 @@ _WINDOW = 128
 _LEAST_PART = 2.0
 
 
-def straightened_proposals(evidence: Evidence) -> list[Proposal]:
-    """One proposal for each pose of the grid that shows a lattice, the most promising first."""
+def straightened_guesses(evidence: Evidence) -> list[Guess]:
+    """One guess for each pose of the grid that shows a lattice, the most promising first."""
     level = evidence.frame
     view_of = _Views(level, evidence.focal_mm)
     found = []
@@ -48,12 +48,12 @@ def straightened_proposals(evidence: Evidence) -> list[Proposal]:
         )
         if pair is not None:
             lattice = Lattice(rx_deg, ry_deg, reduce_basis(pair.basis * unit), middle)
-            found.append(Proposal(lattice, pair.worth, local=False))
-    return sorted(found, key=lambda proposal: -proposal.worth)
+            found.append(lattice_guess(lattice, pair.worth, local=False))
+    return sorted(found, key=lambda guess: -guess.promise)
 
 
-def window_proposals(evidence: Evidence) -> list[Proposal]:
-    """A proposal for each window that shows a lattice, seen straight on, the most promising first."""
+def window_guesses(evidence: Evidence) -> list[Guess]:
+    """A guess for each window that shows a lattice, seen straight on, the most promising first."""
     level = evidence.level(FINE, blur=0.5)
     planes = level.values[:_CHANNELS].permute(1, 2, 0).contiguous().numpy()
     known = level.valid.numpy().astype(np.float32)
@@ -82,8 +82,9 @@ def window_proposals(evidence: Evidence) -> list[Proposal]:
             size = level.photo_size
             origin = (middle[:2] - np.array(size.middle)) / size.unit_px
             basis = pair.basis / level.unit_px
-            found.append(Proposal(Lattice(0.0, 0.0, reduce_basis(basis), origin), pair.worth, local=True))
-    return sorted(found, key=lambda proposal: -proposal.worth)
+            lattice = Lattice(0.0, 0.0, reduce_basis(basis), origin)
+            found.append(lattice_guess(lattice, pair.worth, local=True))
+    return sorted(found, key=lambda guess: -guess.promise)
 
 
 def _starts(length: int, side: int) -> list[int]:

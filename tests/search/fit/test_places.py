@@ -6,13 +6,13 @@ import pytest
 import torch
 from drawn import DrawnRing, tilt_error_deg
 
-from p3i.search.fit.places import FOCALS_MM, CurveFit, curve_score, follow, measured, registered
+from p3i.search.fit.places import FOCALS_MM, Fit, curve_score, follow, measured, registered
 from p3i.search.rings import ring_filling
 
 RING = DrawnRing()
 
 
-def started(ring: DrawnRing, **changes: float) -> CurveFit:
+def started(ring: DrawnRing, **changes: float) -> Fit:
     """The ring's own numbers, spoiled by `changes`, on its photo; the focal is 35 mm."""
     filling = ring.filling()
     fit = measured(ring.evidence(), filling, ring.numbers(filling, **changes), focal_mm=35.0)
@@ -20,7 +20,7 @@ def started(ring: DrawnRing, **changes: float) -> CurveFit:
     return fit
 
 
-def error_deg(fit: CurveFit, ring: DrawnRing) -> float:
+def error_deg(fit: Fit, ring: DrawnRing) -> float:
     return tilt_error_deg(fit.filling.program(fit.z, ()), ring.rx_deg, ring.ry_deg)
 
 

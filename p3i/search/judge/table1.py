@@ -13,8 +13,10 @@ import numpy as np
 from p3i.grammar.departures import departures
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.search.answer import Answer
-from p3i.search.fit.places import CurveFit, curve_score, follow, measured, numbers_of, values_of
-from p3i.search.forms.filling import filling_of
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
+from p3i.search.forms.filling import Filling
+from p3i.search.forms.spelled import ring_filling, rings_filling
 from p3i.search.judge.region import centers_px
 from p3i.search.look.session import Session
 from p3i.search.result import NEEDED
@@ -23,24 +25,31 @@ _ROUNDS = 3
 _NAMES = {"lattice": "a lattice", "circular": "a ring", "hybrid": "a hybrid"}
 
 
-def within_table1(session: Session, answers: list[Answer]) -> list[Answer]:
+def within_table1(look: Session, answers: list[Answer]) -> list[Answer]:
     """The answers that Table 1 can write; the session remembers what else would have been one."""
     within = []
     for answer in answers:
         if departures(answer.program):
-            _unwritable(session, answer)
+            _unwritable(look, answer)
         else:
             within.append(answer)
     return within
 
 
-def unwritable_note(session: Session) -> str:
+def unwritable_note(look: Session) -> str:
     """What was found besides the answer that Table 1 cannot write."""
-    names = " and ".join(_NAMES[structure] for structure in sorted(session.unwritable))
+    names = " and ".join(_NAMES[structure] for structure in sorted(look.unwritable))
     return f"Table 1 cannot write all that was found: {names} would be an answer without strict"
 
 
-def ring_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answer]:
+def in_table1(look: Session, fit: Fit, free: Answer) -> list[Answer]:
+    """The answer in the words of Table 1, fitted anew; empty where it has none for it."""
+    if free.structure == "lattice":
+        return [free]
+    return (_ring if free.structure == "circular" else _hybrid)(look, fit, free)
+
+
+def _ring(look: Session, fit: Fit, free: Answer) -> list[Answer]:
     """The ring or arc of a fit with phase 0; empty where too few of its objects are in sight then.
 
     Angles are counted from 0 in steps, so the objects move along the circle by up to half a step.
@@ -49,12 +58,7 @@ def ring_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answer
     step, first = values.get("draw.x.angle.j"), 0
     if step is not None:
         first = round(values["draw.x.angle.1"] % 360 / step)
-    angle = f"360/{drawn}*j" if step is None else "?s*j"
-    text = (
-        "SetCameraPose(rx=??, ry=??)\n"
-        f"for j in range({first}, {first + drawn}):\n"
-        f"    Draw(x=?r*Cos({angle}) + ?x, y=?r*Sin({angle}) + ?y)\n"
-    )
+    filling = ring_filling(drawn, drawn=None if step is None else drawn, first=first, phase=False)
     # `i` is 1 where no loop binds it: the table has no other way to say how many.
     bounds = {
         "for_j.start.1": 0.0,
@@ -62,10 +66,10 @@ def ring_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answer
         "for_j.stop.1": 0.0,
         "for_j.stop.i": first + drawn,
     }
-    return _fitted(session, fit, free, text=text, values=values, bounds=bounds)
+    return _fitted(look, fit, free, filling=filling, values=values, bounds=bounds)
 
 
-def hybrid_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answer]:
+def _hybrid(look: Session, fit: Fit, free: Answer) -> list[Answer]:
     """Rings around one centre with multiples of one number for radii, and phase 0.
 
     Empty where the table has no words for them: a ring along a line, a fan that begins at another angle.
@@ -77,32 +81,26 @@ def hybrid_in_table1(session: Session, fit: CurveFit, free: Answer) -> list[Answ
     phase = (values["draw.x.angle.1"] + 180) % 360 - 180
     elsewhere = fan and abs(phase) > abs(values["draw.x.angle.j"]) / 2
     if growth <= 0 or "draw.x.offset.i" in values or elsewhere:
-        return _unwritable(session, free)
+        return _unwritable(look, free)
     # Rings are counted from the centre; those of a fan have so many objects as their number says.
     shift = 0 if fan else max(round(values["draw.x.radius.1"] / growth), 1 - first)
-    angle, last = ("?s*j", f"{count}*i") if fan else (f"360/{count}*j", str(count))
-    text = (
-        "SetCameraPose(rx=??, ry=??)\n"
-        f"for i in range({first + shift}, {stop + shift}):\n"
-        f"    for j in range(0, {last}):\n"
-        f"        Draw(x=?b*i*Cos({angle}) + ?x, y=?b*i*Sin({angle}) + ?y)\n"
-    )
+    filling = rings_filling(first + shift, stop + shift, count, fan=fan, grows=True, moves=False, table1=True)
     # With `count*i` turns the ring i is drawn i times over, each object on itself (DESIGN 2.2).
     bounds = {"for_j.stop.1": 0.0, "for_j.stop.i": count}
-    return _fitted(session, fit, free, text=text, values=values, bounds=bounds)
+    return _fitted(look, fit, free, filling=filling, values=values, bounds=bounds)
 
 
 def _fitted(
-    session: Session,
-    fit: CurveFit,
+    look: Session,
+    fit: Fit,
     free: Answer,
     *,
-    text: str,
+    filling: Filling,
     values: dict[str, float],
     bounds: dict[str, float],
 ) -> list[Answer]:
-    """The sketch `text` fitted from `values`, with its loops' `bounds` put as Table 1 says them."""
-    evidence, filling = session.evidence, filling_of(text)
+    """The filling fitted from `values`, with its loops' `bounds` put as Table 1 says them."""
+    evidence = look.evidence
     start = measured(evidence, filling, numbers_of(filling, values), focal_mm=fit.focal_mm)
     if start is None:
         return []
@@ -116,14 +114,14 @@ def _fitted(
         worth=score,
         focal_mm=None if free.focal_mm is None else round(moved.focal_mm, 2),
     )
-    away = _median_px(session, answer, free)
+    away = _median_px(look, answer, free)
     note = f"Table 1 has no phase: the objects lie {away:.1f} pixels from the free fit"
     return [replace(answer, notes=(*free.notes, note))]
 
 
-def _median_px(session: Session, answer: Answer, free: Answer) -> float:
+def _median_px(look: Session, answer: Answer, free: Answer) -> float:
     """How far the objects of an answer on the photo typically lie from the nearest of another one's."""
-    image, assumed = session.evidence.image, session.evidence.focal_mm
+    image, assumed = look.evidence.image, look.evidence.focal_mm
     ours, theirs = (
         np.array(centers_px(one.program, image, one.focal_mm or assumed)).reshape(-1, 4)[:, :2]
         for one in (answer, free)
@@ -133,8 +131,8 @@ def _median_px(session: Session, answer: Answer, free: Answer) -> float:
     return float(np.median(np.linalg.norm(ours[:, None] - theirs, axis=2).min(1)))
 
 
-def _unwritable(session: Session, free: Answer) -> list[Answer]:
+def _unwritable(look: Session, free: Answer) -> list[Answer]:
     """No answer, and a note in the session where it would have been one."""
     if free.score >= NEEDED:
-        session.unwritable.add(free.structure)
+        look.unwritable.add(free.structure)
     return []

@@ -7,17 +7,16 @@ these points.
 """
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from p3i.interp.camera import image_from_plane, project
-from p3i.interp.compile import compile
-from p3i.search.answer import Answer
-from p3i.search.extent.layout import Layout, filling_layout
-from p3i.search.forms.lattice import Lattice, lattice_pattern
-from p3i.search.judge.evaluate import score_of_program
+from p3i.search.forms.guess import Guess, lattice_guess
+from p3i.search.forms.lattice import Lattice
 from p3i.search.look.evidence import COARSE, Evidence
 from p3i.search.look.session import Session
 from p3i.vision.features import FeatureMap
@@ -39,40 +38,33 @@ _LEAST_ANGLE_DEG = 44
 # Loops run from -_REACH to _REACH: what lies outside the picture is not drawn.
 _REACH = 12
 _BATCH = 200
+_FEWEST_TOLD = 4
 
 
-def find_by_paper(session: Session) -> list[Answer]:
-    """The lattices of least loss, the least first; each fills the picture."""
-    evidence = session.evidence
+def paper_guesses(look: Session) -> Iterator[Guess]:
+    """The lattices of least loss, the least first; they are to stay as they are."""
+    evidence = look.evidence
     features = evidence.features(COARSE)
-    numbers = _grid(session.generator)
+    numbers = _grid(look.generator)
     losses: list[Tensor] = []
-    with session.until_interrupted():
+    with look.until_interrupted():
         for first in range(0, len(numbers), _BATCH):
-            if losses and not session.go_on():
+            if losses and not look.go_on():
                 break
-            session.tell("the paper's grid", 0.5 * first / len(numbers))
+            look.tell("the paper's grid", 0.5 * first / len(numbers))
             with torch.no_grad():
                 losses.append(equation2(evidence, features, numbers[first : first + _BATCH]))
     if not losses:
-        return []
+        return
     order = torch.argsort(torch.cat(losses), stable=True)[:DESCENTS]
-    moved = _descended(session, features, numbers[order])
-    return session.completed(lambda: _answers(session, features, moved))
-
-
-def _answers(session: Session, features: FeatureMap, moved: Tensor) -> list[Answer]:
-    """The lattices [K, 6] of least loss as programs, the least first."""
-    evidence = session.evidence
+    moved = _descended(look, features, numbers[order])
     with torch.no_grad():
         loss = equation2(evidence, features, moved)
-    answers: list[Answer] = []
-    for place in torch.argsort(loss, stable=True)[: max(4, session.config.top)].tolist():
-        answer = _answer(evidence, moved[place], loss=float(loss[place]))
-        if answer is not None:
-            session.record("descended", loss=float(loss[place]), program=answer.program)
-            answers.append(answer)
-    return answers
+    for place in torch.argsort(loss, stable=True)[: max(_FEWEST_TOLD, look.config.top)].tolist():
+        if math.isfinite(float(loss[place])):
+            values = moved[place].tolist()
+            lattice = Lattice(values[0], values[1], np.array([values[2:4], values[4:6]]), np.zeros(2))
+            yield replace(lattice_guess(lattice, 1 / (1 + float(loss[place])), local=False), settled=True)
 
 
 def equation2(evidence: Evidence, features: FeatureMap, numbers: Tensor) -> Tensor:
@@ -125,16 +117,16 @@ def _allowed(numbers: Tensor) -> Tensor:
     return inside & (sine > math.sin(math.radians(_LEAST_ANGLE_DEG))) & (u[:, 0] > 0)
 
 
-def _descended(session: Session, features: FeatureMap, numbers: Tensor) -> Tensor:
+def _descended(look: Session, features: FeatureMap, numbers: Tensor) -> Tensor:
     """The numbers [K, 6] after Adam on equation 2 alone, which rewards shrunk and blurred views."""
     first, second = torch.zeros_like(numbers), torch.zeros_like(numbers)
-    with session.until_interrupted():
+    with look.until_interrupted():
         for step in range(1, STEPS + 1):
-            if not session.go_on():
+            if not look.go_on():
                 break
-            session.tell("the paper's descent", 0.5 + 0.5 * step / STEPS)
+            look.tell("the paper's descent", 0.5 + 0.5 * step / STEPS)
             leaf = numbers.clone().requires_grad_()
-            loss = equation2(session.evidence, features, leaf)
+            loss = equation2(look.evidence, features, leaf)
             (slope,) = torch.autograd.grad(loss[torch.isfinite(loss)].sum(), leaf)
             slope = torch.nan_to_num(slope)
             first = 0.9 * first + 0.1 * slope
@@ -145,17 +137,3 @@ def _descended(session: Session, features: FeatureMap, numbers: Tensor) -> Tenso
             tilted = after[:, :2].abs().amax(1) > _MOST_TILT_DEG
             numbers = torch.where((_allowed(after) & ~tilted)[:, None], after, numbers)
     return numbers
-
-
-def _answer(evidence: Evidence, numbers: Tensor, *, loss: float) -> Answer | None:
-    """The lattice as a program that fills the picture; its worth is the loss, turned round."""
-    values = numbers.tolist()
-    basis = np.array([values[2:4], values[4:6]])
-    lattice = Lattice(values[0], values[1], basis, np.zeros(2))
-    layout = filling_layout(evidence, lattice_pattern(), Layout(lattice, (0, 1), (0, 1)))
-    program = layout.program(from_zero=not evidence.config.strict)
-    pattern = compile(program)
-    seen = evidence.in_sight(pattern)
-    if not math.isfinite(loss) or int(seen.sum()) < 4:
-        return None
-    return Answer(program, "lattice", score_of_program(evidence, program), 1 / (1 + loss))

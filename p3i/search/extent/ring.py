@@ -1,0 +1,54 @@
+"""From a ring that was fitted to a program: how far it goes, and where on it the objects are."""
+
+import numpy as np
+
+from p3i.search.extent.arc import as_far_as_it_goes
+from p3i.search.extent.sector import Place, Ring, places
+from p3i.search.fit.fitted import Drawn, Fit
+from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
+from p3i.search.look.session import Session
+
+# So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
+_MOST_PLACES = 2
+_MUCH_BETTER = 4.0
+
+
+def drawn_ring(look: Session, fit: Fit) -> Drawn:
+    """The ring as far as it goes, its draws put where the objects sit."""
+    fit = as_far_as_it_goes(look, fit)
+    # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
+    found, sure = fit, curve_score(fit)
+    for rank, place in enumerate(places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]):
+        moved = _moved(look, fit, place)
+        if moved is None:
+            continue
+        sure = max(sure, curve_score(moved))
+        if rank == 0 or moved.mean > _MUCH_BETTER * found.mean:
+            found = moved
+    return Drawn(found.program(), found, sure)
+
+
+def _moved(look: Session, fit: Fit, place: Place) -> Fit | None:
+    """The fit with its draws on the objects, fitted once more."""
+    values = values_of(fit)
+    values["draw.x.radius.1"] = place.radius
+    values["draw.x.angle.1"] += place.turn_deg
+    moved = measured(look.evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=fit.focal_mm)
+    if moved is None:
+        return None
+    free = fit.focal_mm != look.evidence.focal_mm
+    return follow(look.evidence, moved, rounds=3, free_focal=free)
+
+
+def _ring_of(look: Session, fit: Fit) -> Ring:
+    values = values_of(fit)
+    seen = fit.pattern.image_from_plane(fit.theta, size=look.evidence.image.size, focal_mm=fit.focal_mm)
+    return Ring(
+        center=np.array([values["draw.x.offset.1"], values["draw.y.offset.1"]]),
+        radius=values["draw.x.radius.1"],
+        first_deg=values["draw.x.angle.1"],
+        step_deg=values.get("draw.x.angle.j", 360 / len(fit.pattern.index)),
+        index=fit.index[:, 1].numpy(),
+        weights=fit.contrast.numpy().astype(float),
+        image_from_plane=seen.numpy(),
+    )

@@ -1,0 +1,63 @@
+"""What a search has so far: what proposers may start from, and the answers."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from p3i.search.answer import Answer
+from p3i.search.fit.fitted import Drawn, Fit
+from p3i.search.forms.sketches import Sketched
+
+# Where a program scores this, a pattern of another structure could not explain the photo better.
+_BEYOND_DOUBT = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A program that was found for a sketch, and what it is as an answer: in strict, it may be none."""
+
+    sketch: Sketched
+    drawn: Drawn
+    answers: tuple[Answer, ...]
+
+
+@dataclass(slots=True)
+class Best:
+    """All that was found, in order; `fits` are all that were worth drawing, drawn or not."""
+
+    found: list[Found] = field(default_factory=list)
+    fits: list[Fit] = field(default_factory=list)
+
+    def add(self, sketch: Sketched, drawn: Drawn, answers: Iterable[Answer]) -> None:
+        """Take in a program."""
+        self.found.append(Found(sketch, drawn, tuple(answers)))
+
+    def leaves_room_for(self, sketch: Sketched) -> bool:
+        """Whether a program of this sketch could explain more than what was found.
+
+        Hybrids hold rings, and say more than these, however sure they are.
+        """
+        return not any(
+            answer.score > _BEYOND_DOUBT
+            and answer.structure != sketch.structure
+            and not (sketch.structure == "hybrid" and answer.structure == "circular")
+            for answer in self.asked()
+        )
+
+    def rings(self) -> list[Drawn]:
+        """The rings that were found, the surest first."""
+        rings = [one.drawn for one in self.found if one.sketch.shape == "ring"]
+        return sorted(rings, key=lambda drawn: -drawn.sure)
+
+    def of(self, sketch: Sketched) -> list[Answer]:
+        """The answers that a sketch has."""
+        return [answer for one in self.found if one.sketch is sketch for answer in one.answers]
+
+    def alike(self, sketch: Sketched) -> list[Answer]:
+        """The answers of other sketches of the same structure, the most worth first."""
+        others = (one for one in self.found if one.sketch is not sketch)
+        alike = [one for one in others if one.sketch.structure == sketch.structure]
+        return sorted((answer for one in alike for answer in one.answers), key=lambda one: -one.worth)
+
+    def asked(self) -> Iterator[Answer]:
+        """The answers that the options ask for, not those that others only start from."""
+        return (answer for one in self.found if one.sketch.asked for answer in one.answers)

@@ -1,0 +1,144 @@
+"""From the answers of a search to its result: the best of them, or why none of them is one."""
+
+from p3i.grammar.ast import Program
+from p3i.interp.camera import Camera
+from p3i.search.answer import Answer
+from p3i.search.config import SearchConfig
+from p3i.search.forms.asked import asks_for_itself, needed_for, stated_focal, why_not
+from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
+from p3i.search.judge.region import centers_px, region_px, share_in_sight
+from p3i.search.judge.same import distinct_answers
+from p3i.search.judge.table1 import unwritable_note, within_table1
+from p3i.search.look.session import Session
+from p3i.search.optics.focal import with_own_focal
+from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
+from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
+from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
+from p3i.vision.image import Image
+
+# A curve of which the photo shows less than this share was not seen.
+_LEAST_IN_SIGHT = 0.5
+
+
+def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, FocalSource]) -> SynthesisResult:
+    """The best of the answers as the result of the search, or why none of them is one."""
+    config, image, focal_mm = look.config, look.evidence.image, assumed[0]
+    needed = needed_for(config)
+    if config.focal_mm == "auto":
+        answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
+    if config.strict:
+        answers = within_table1(look, answers)
+    printed = with_printed_scores(look.evidence, answers, needed=needed)
+    sure = convincing(answers, printed, needed=needed, fills=config.extent_used == "image")
+    # What a person asked for is theirs to choose, whatever it costs.
+    asked = asks_for_itself(config)
+    seen = sure if asked else [answer for answer in sure if _in_sight(look, answer)]
+    good = seen if asked else [answer for answer in seen if answer.worth > 0]
+    if not good:
+        best = max((answer.score for answer in printed), default=0.0)
+        reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
+        if look.unwritable and not sure:
+            reason = StopReason.OUTSIDE_TABLE_1
+        refused = told(config, assumed, None, look.stopped or reason, score=best, needed=needed)
+        look.record("answer", program=None, score=best, reason=refused.reason)
+        return refused
+    good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
+    first = good[0]
+    runner_up = max((answer.worth for answer in good[1:]), default=0.0)
+    margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
+    other = _mirrored(look, first)
+    sigma_deg = pose_sigma_deg(look.evidence, first)
+    doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
+    ambiguity = None if other is None else ambiguity_note(other)
+    notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
+    if config.extent_used == "image" and first.structure != "lattice":
+        notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
+    if look.unwritable - {first.structure}:
+        notes = (*notes, unwritable_note(look))
+    centers = centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1)
+    by_score = first.score >= needed
+    if not by_score and config.extent_used == "found":
+        notes = (*notes, faint_note(first, len(centers)))
+    look.tell("done", 1.0)
+    look.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
+    return told(
+        config,
+        assumed,
+        first.program,
+        look.stopped or StopReason.FOUND,
+        structure=first.structure,
+        score=first.score,
+        margin=margin,
+        needed=needed if by_score else None,
+        false_alarms=false_alarms(first.structure, first.worth),
+        candidates=tuple(
+            Candidate(
+                program=answer.program,
+                score=answer.score,
+                structure=answer.structure,
+                false_alarms=false_alarms(answer.structure, answer.worth),
+                **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
+            )
+            for answer in good[: config.top]
+        ),
+        centers=centers,
+        region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
+        lens_k1=first.lens_k1,
+        pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
+        mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
+        notes=notes,
+        **_focal_facts(first, assumed),
+    )
+
+
+def told(
+    config: SearchConfig,
+    assumed: tuple[float, FocalSource],
+    program: Program | None,
+    stop: StopReason,
+    **more: object,
+) -> SynthesisResult:
+    """A result with the facts that every one has, and `more`."""
+    facts = {**_focal_facts(None, assumed), "features": config.features_used, "seed": config.seed, **more}
+    return SynthesisResult(program=program, stop=stop, **facts)  # pyright: ignore[reportArgumentType]
+
+
+def _in_sight(look: Session, answer: Answer) -> bool:
+    """Whether the photo shows at least half of the objects of a curve, which it would be the evidence of.
+
+    The box of indices of a lattice that stands askew to the frame has half of its corners outside.
+    """
+    if answer.structure == "lattice":
+        return True
+    focal_mm = answer.focal_mm or look.evidence.focal_mm
+    shown = share_in_sight(answer.program, look.evidence.image, focal_mm, lens_k1=answer.lens_k1)
+    return shown >= _LEAST_IN_SIGHT
+
+
+def _mirrored(look: Session, answer: Answer) -> Camera | None:
+    """The other tilt that a ring leaves open; more than one circle tells the tilt, and no time is no look."""
+    if answer.structure != "circular" or answer.lens_k1 is not None or look.stopped is not None:
+        return None
+    with look.until_interrupted():
+        return mirrored_camera(look.evidence, answer)
+    return None
+
+
+def focal_of(image: Image, config: SearchConfig) -> tuple[float, FocalSource]:
+    """The focal that is assumed, and why: the option, a sketch's header, the photo's EXIF data, or 35 mm."""
+    if config.focal_mm is not None and config.focal_mm != "auto":
+        return config.focal_mm, "option"
+    if (stated := stated_focal(config)) is not None:
+        return stated, "header"
+    if image.focal_mm is not None:
+        return image.focal_mm, "exif"
+    return 35.0, "default"
+
+
+def _focal_facts(answer: Answer | None, assumed: tuple[float, FocalSource]) -> dict[str, object]:
+    """The focal of an answer, its source and the reason, as fields of a result; None is told as assumed."""
+    mm, source = assumed
+    if answer is not None and answer.focal_mm is not None:
+        mm, source = answer.focal_mm, "pattern"
+    reason = answer.focal_reason if answer is not None else ""
+    return {"focal_mm": mm, "focal_source": source, "focal_reason": reason or FOCAL_REASONS[source]}

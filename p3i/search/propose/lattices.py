@@ -1,0 +1,21 @@
+"""Where lattices may be: guesses from views and from windows, the promising ones first and in turn."""
+
+from collections.abc import Iterator
+
+from p3i.search.forms.guess import Guess
+from p3i.search.look.session import Session
+from p3i.search.propose.windows import straightened_guesses, window_guesses
+
+# So many guesses of each kind are looked at.
+_MOST = 10
+
+
+def lattice_guesses(look: Session) -> Iterator[Guess]:
+    """The guesses of both kinds in turn, each kind's best first."""
+    look.tell("looking through windows", 0.02)
+    windows = window_guesses(look.evidence)[:_MOST]
+    look.tell("straightening", 0.1)
+    views = straightened_guesses(look.evidence)[:_MOST]
+    for place in range(_MOST):
+        yield from views[place : place + 1]
+        yield from windows[place : place + 1]
