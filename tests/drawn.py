@@ -12,8 +12,8 @@ from p3i.grammar.ast import Program
 from p3i.interp.camera import Camera, rotation
 from p3i.search.config import SearchConfig
 from p3i.search.forms.filling import Filling
+from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
-from p3i.search.rings import ring_filling
 from p3i.size import Size
 from p3i.vision.image import Image
 

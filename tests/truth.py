@@ -11,14 +11,15 @@ from p3i.grammar.ast import Affine, Program
 from p3i.interp.camera import Camera, rotation
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
-from p3i.search.forms.lattice import Lattice, lattice_pattern
+from p3i.search.forms.lattice import Lattice
+from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.evidence import Evidence, Level
 from p3i.size import Size
 
 torch.set_num_threads(1)
 
 SMALL = Size(448, 336)
-PATTERN = lattice_pattern()
+PATTERN = lattice_filling().pattern
 
 
 @cache

@@ -67,12 +67,12 @@ def synthesize(
         look = Session(Evidence(image, config, assumed[0]), config, progress, trace and _in_text(trace))
         width, height = image.size.width, image.size.height
         look.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
-        answers = _searched(look) if config.lens is None else _searched_with_lens(look)
+        answers = _answers(look) if config.lens is None else _answers_with_lens(look)
         return look.completed(lambda: outcome(look, answers, assumed=assumed))
 
 
-def _searched(look: Session) -> list[Answer]:
-    """The answers that the options ask for, the most worth first; an interrupt ends the search with them."""
+def searched(look: Session) -> Best:
+    """All that is found of the sketches which the options ask for; an interrupt ends the search with that."""
     best = Best()
     spoken: set[Proposer] = set()
     begun = False
@@ -87,7 +87,7 @@ def _searched(look: Session) -> list[Answer]:
                     spoken |= {proposer} if proposer.all_at_once else set()
                     _take_up(look, sketch, proposer, best)
             begun |= sketch.asked
-    return look.completed(lambda: _by_worth(look, best))
+    return best
 
 
 def _take_up(look: Session, sketch: Sketched, proposer: Proposer, best: Best) -> None:
@@ -157,8 +157,13 @@ def _rivals(
         yield guess, fit
 
 
-def _by_worth(look: Session, best: Best) -> list[Answer]:
-    """The answers by the bits that they explain; each structure's in its own order, the most worth first."""
+def _answers(look: Session) -> list[Answer]:
+    """The answers of a search, by the bits that they explain; each structure's in its own order."""
+    best = searched(look)
+    return look.completed(lambda: _by_bits(look, best))
+
+
+def _by_bits(look: Session, best: Best) -> list[Answer]:
     asked = sorted(best.asked(), key=lambda answer: -answer.worth)
     groups = [[one for one in asked if one.structure == structure] for structure in STRUCTURES]
     answers = by_explained(look.evidence, groups, needed=needed_for(look.config))
@@ -173,12 +178,12 @@ def _finished(look: Session, fit: Fit) -> Answer | None:
     return None if found is None else Answer(found.program, "lattice", found.sure, worth(found.fit))
 
 
-def _searched_with_lens(look: Session) -> list[Answer]:
+def _answers_with_lens(look: Session) -> list[Answer]:
     """What is found through the lens of the options; once interrupted, what the photo as it is had shown."""
     plain: list[Answer] = []
 
     def search(inner: Session) -> list[Answer]:
-        found = _searched(inner)
+        found = _answers(inner)
         if inner is look:
             plain[:] = found
         return found

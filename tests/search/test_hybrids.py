@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from drawn import DrawnRing
-from ringed import session_on, session_with_ring
+from ringed import found_on, found_ring, searches_around
 
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.scene import Scene, on_canvas
@@ -18,44 +18,29 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.fit.places import Fit
-from p3i.search.hybrids import (
-    _drawn_once,
-    _evenly_sure,
-    _without_empty_middle,
-    find_hybrids,
-    hybrid_filling,
-)
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.places import numbers_of
+from p3i.search.fit.rings import _drawn_once, evenly_sure
+from p3i.search.forms.spelled import rings_filling
+from p3i.search.judge.answered import _without_empty_middle
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
-from p3i.search.propose.repeats import HybridProposal
 from p3i.search.result import NEEDED
-from p3i.search.rings import numbers_of
+from p3i.search.synthesize import searched
 
 SCENES = {"concentric": 12, "fan": 9, "row": 14}
-PROPOSAL = HybridProposal(
-    first=1,
-    last=3,
-    radius=2.0,
-    growth=8.0,
-    center=(0.0, 0.0),
-    along=(0.0, 0.0),
-    step_deg=20.0,
-    phase_deg=5.0,
-    count=4,
-    counted_by_ring=True,
-    objects=24.0,
-)
+CONFIG = SearchConfig(structure="hybrid", focal_mm=35.0)
 
 
 @lru_cache
 def shown(kind: str, seed: int | None = None, *, of: int = 1) -> tuple[Scene, Answer]:
     """The scene of a kind, and the answer from one of its rings, by default the second."""
     scene = hybrid_scene(SCENES[kind] if seed is None else seed, kind=kind)
-    session = session_on(scene, of=of)
-    answers = find_hybrids(session)
+    with pytest.MonkeyPatch.context() as patch:
+        searches_around(patch, found_on(scene, of=of))
+        answers = list(searched(Session(Evidence(scene.image(), CONFIG, 35.0), CONFIG)).asked())
     assert answers, f"no hybrid in the scene of kind {kind}"
-    return scene, answers[0]
+    return scene, max(answers, key=lambda answer: answer.worth)
 
 
 @pytest.mark.parametrize("kind", SCENES)
@@ -87,7 +72,7 @@ def test_a_fan_is_found_from_its_inner_ring_though_the_outer_draws_lie_far_apart
 
 def rings_with(*contrasts: list[float]) -> Fit:
     """A fit of a row of rings of five whose objects in sight agree so well."""
-    filling = hybrid_filling(replace(PROPOSAL, first=0, last=2, count=5, counted_by_ring=False))
+    filling = rings_filling(0, 3, 5, fan=False, grows=True, moves=False)
     index = [(i, j) for i, ring in enumerate(contrasts) for j in range(len(ring))]
     together = torch.tensor([one for ring in contrasts for one in ring])
     return Fit(filling, torch.zeros(0), 35.0, 1.0, torch.tensor(index).double(), together)
@@ -95,22 +80,20 @@ def rings_with(*contrasts: list[float]) -> Fit:
 
 def test_a_ring_of_which_two_objects_are_in_sight_makes_no_hybrid() -> None:
     sure = [0.9] * 5
-    assert _evenly_sure(rings_with(sure, [0.9] * 3, sure))
-    assert not _evenly_sure(rings_with(sure, [0.9] * 2, sure))
+    assert evenly_sure(rings_with(sure, [0.9] * 3, sure))
+    assert not evenly_sure(rings_with(sure, [0.9] * 2, sure))
 
 
 def test_a_ring_that_has_two_objects_of_another_one_makes_no_hybrid() -> None:
     sure = [0.9] * 5
-    assert not _evenly_sure(rings_with(sure, [0.9, 0.9, 0.0, 0.0, 0.0]))
-    assert _evenly_sure(rings_with(sure, [0.9, 0.9, 0.9, 0.0, 0.0]))
+    assert not evenly_sure(rings_with(sure, [0.9, 0.9, 0.0, 0.0, 0.0]))
+    assert evenly_sure(rings_with(sure, [0.9, 0.9, 0.9, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize(("step", "once"), [(24.0, False), (40.0, True), (48.0, True)])
 def test_a_ring_laid_over_its_own_objects_makes_no_hybrid(step: float, once: bool) -> None:
     """Six on a circle of 24: a step of one radius takes two thirds of them onto others."""
-    filling = hybrid_filling(
-        replace(PROPOSAL, first=0, last=1, count=6, counted_by_ring=False, growth=0.0, along=(step, 0.0))
-    )
+    filling = rings_filling(0, 2, 6, fan=False, grows=False, moves=True)
     values = dict.fromkeys((unknown.name for unknown in filling.moving), 0.0)
     z = numbers_of(filling, values | {"draw.x.radius.1": 24.0, "draw.x.offset.i": step})
     index = filling.pattern.index.double()
@@ -143,7 +126,7 @@ def test_a_row_of_rings_moves_its_centre_with_i_and_not_its_radius() -> None:
     assert isinstance(x, Polar) and x.radius.i == 0 and x.offset.i != 0
 
 
-def test_a_single_ring_is_no_hybrid() -> None:
+def test_a_single_ring_is_no_hybrid(monkeypatch: pytest.MonkeyPatch) -> None:
     ring = DrawnRing()
     values = {
         "camera.rx": ring.rx_deg,
@@ -153,11 +136,12 @@ def test_a_single_ring_is_no_hybrid() -> None:
         "draw.x.offset.1": ring.center[0],
         "draw.y.offset.1": ring.center[1],
     }
-    session = session_with_ring(ring.evidence(), values, count=ring.count)
-    assert session.rings is not None and session.rings[0].score > NEEDED
-    assert find_hybrids(session) == []
+    known = found_ring(ring.evidence(), values, count=ring.count)
+    assert known.sure > NEEDED
+    searches_around(monkeypatch, known)
+    assert searched(Session(ring.evidence(), CONFIG)).found == []
 
 
 def test_the_sketch_of_a_fan_draws_four_eight_and_twelve_objects() -> None:
-    index = hybrid_filling(PROPOSAL).pattern.index[:, 0]
+    index = rings_filling(1, 4, 4, fan=True, grows=True, moves=False).pattern.index[:, 0]
     assert [int((index == i).sum()) for i in (1, 2, 3)] == [4, 8, 12]

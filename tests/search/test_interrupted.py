@@ -8,19 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 from drawn import DrawnRing
-from ringed import session_on
+from ringed import found_on, searches_around
 from truth import pose_error_deg, small_scene
 
 import p3i
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.program_scenes import program_scene
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.search import asked, hybrids, paper, rings, sketched
-from p3i.search.answer import Answer
+from p3i.search import synthesize as synthesize_module
 from p3i.search.config import SearchConfig
+from p3i.search.fit.fitted import Drawn
+from p3i.search.forms.sketches import by_hand
 from p3i.search.look.session import Session
 from p3i.search.optics import lens as lens_module
-from p3i.search.propose import climb
+from p3i.search.propose import climb, holes, paper, rings
 from p3i.search.propose.votes import RingProposal
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.search.synthesize import synthesize
@@ -46,9 +47,9 @@ def row_sketch() -> Sketch:
 
 
 @cache
-def rings_of_fan() -> tuple[Image, Any]:
+def ring_of_fan() -> tuple[Image, Drawn]:
     scene = hybrid_scene(9, kind="fan")
-    return scene.image(), session_on(scene, of=1).rings
+    return scene.image(), found_on(scene, of=1)
 
 
 Search = Callable[[pytest.MonkeyPatch], Callable[..., SynthesisResult]]
@@ -71,18 +72,18 @@ def ring(patch: pytest.MonkeyPatch) -> Callable[..., SynthesisResult]:
 
 
 def hybrid(patch: pytest.MonkeyPatch) -> Callable[..., SynthesisResult]:
-    image, known = rings_of_fan()
-    patch.setattr(hybrids, "found_rings", lambda _: known)
+    image, known = ring_of_fan()
+    searches_around(patch, known)
     config = SearchConfig(structure="hybrid", focal_mm=35.0)
     return lambda **told: synthesize(image, config, **told)
 
 
 def filled(patch: pytest.MonkeyPatch) -> Callable[..., SynthesisResult]:
-    """A small grid of which two points are fitted, be they alike, and no family to begin with."""
+    """A small grid of which two points are fitted, be they alike, and nothing to begin with."""
     patch.setattr(climb, "distinct", lambda _, found: found)
-    patch.setattr(sketched, "distinct", lambda _, found: found)
-    patch.setattr(asked, "_by_family", lambda *_: [])
-    patch.setitem(sketched.find_by_sketch.__kwdefaults__, "effort", sketched.Effort(1500, 500, 2, 1))
+    patch.setattr(holes, "distinct", lambda _, found: found)
+    patch.setattr(synthesize_module, "sketches", lambda config: [by_hand("the sketch", config.sketch)])
+    patch.setattr(holes, "BY_HAND", holes.Effort(1500, 500, 2, 1))
     return lambda **told: synthesize(row_image(), SearchConfig(sketch=row_sketch()), **told)
 
 
@@ -129,25 +130,25 @@ class Said(Once):
 
 
 IN_A_CALL = [
-    ("lattice", "lattices.with_note_of_others", 1),
-    ("ring", "rings.ring_fit", 2),
-    ("ring", "rings._extended", 1),
-    ("ring", "rings.places", 2),
-    ("hybrid", "hybrids._fitted", 2),
-    ("hybrid", "hybrids._grow", 1),
-    ("hybrid", "hybrids.measured", 2),
-    ("hybrid", "hybrids.explained_bits", 1),
+    ("lattice", "synthesize.with_note_of_others", 1),
+    ("ring", "synthesize.fit_places", 2),
+    ("ring", "extent.ring.as_far_as_it_goes", 1),
+    ("ring", "extent.ring.places", 2),
+    ("hybrid", "synthesize.fit_places", 2),
+    ("hybrid", "extent.further_rings._one_more", 1),
+    ("hybrid", "extent.further_rings.measured", 2),
+    ("hybrid", "judge.answered.explained_bits", 1),
     ("sketch", "propose.climb.score_points", 3),
     ("sketch", "propose.climb.distinct_share", 6),
     ("sketch", "propose.climb._descended", 1),
-    ("sketch", "sketched.distinct", 1),
-    ("sketch", "sketched._on_objects", 1),
-    ("sketch", "sketched._centred", 2),
-    ("start", "sketched._best_extent", 1),
-    ("paper", "paper.equation2", 3),
-    ("paper", "paper._answer", 2),
+    ("sketch", "propose.holes.distinct", 1),
+    ("sketch", "extent.setting._on_objects", 1),
+    ("sketch", "extent.setting._centred", 2),
+    ("start", "extent.setting._best_extent", 1),
+    ("paper", "propose.paper.equation2", 3),
+    ("paper", "judge.answered.score_of_program", 2),
     ("ring", "synthesize.by_explained", 1),
-    ("ring", "synthesize.distinct_answers", 1),
+    ("ring", "outcome.distinct_answers", 1),
 ]
 
 
@@ -168,14 +169,14 @@ def test_an_interrupt_within_a_step_keeps_the_best_so_far(
 
 TOLD = [
     ("lattice", "trace", "candidate", 1),
-    ("ring", "trace", "ring", 1),
-    ("hybrid", "trace", "hybrid", 1),
-    ("sketch", "progress", "fitting to the objects", 2),
-    ("sketch", "trace", "grid", 1),
+    ("ring", "trace", "fit", 1),
+    ("hybrid", "trace", "candidate", 1),
+    ("sketch", "progress", "refining", 2),
+    ("sketch", "trace", "proposal", 1),
     ("sketch", "trace", "fit", 1),
     ("paper", "progress", "the paper's grid", 2),
     ("paper", "progress", "the paper's descent", 3),
-    ("paper", "trace", "descended", 1),
+    ("paper", "trace", "candidate", 1),
     ("ring", "progress", "done", 1),
     ("ring", "trace", "answer", 1),
 ]
@@ -197,7 +198,7 @@ def test_a_second_interrupt_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> Non
         raise KeyboardInterrupt
 
     search = ring(monkeypatch)
-    monkeypatch.setattr(rings, "_extended", raising)
+    monkeypatch.setattr("p3i.search.extent.ring.as_far_as_it_goes", raising)
     with pytest.raises(KeyboardInterrupt):
         search()
 
@@ -226,24 +227,6 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer(
         result = search()
         assert result.stop is StopReason.TIME_UP
         assert result.program is not None, f"nothing after {limit} of {whole}"
-
-
-def test_an_interrupt_while_sketches_are_walked_keeps_what_these_found(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    near = p3i.loads(ROWS.format(rx=-40, step=10.5))
-    tried: list[object] = []
-
-    def found(session: Session, sketch: Sketch, effort: object) -> list[Answer]:
-        tried.append(sketch)
-        session.stopped = StopReason.INTERRUPTED
-        return [Answer(near, "lattice", 0.9, 0.9)]
-
-    monkeypatch.setattr(asked, "find_by_sketch", found)
-    monkeypatch.setattr("p3i.search.synthesize.FAMILIES", ())
-    result = synthesize(row_image(), SearchConfig(exhaustive_s=60))
-    assert len(tried) == 1
-    assert (result.program, result.stop) == (near, StopReason.INTERRUPTED)
 
 
 def test_an_interrupt_while_the_lens_is_estimated_keeps_what_the_photo_showed(

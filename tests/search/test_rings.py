@@ -1,7 +1,6 @@
 """Rings, from the photo to the program: found where there is one, whole or open, and nothing in blotches."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,13 +14,17 @@ from p3i.evaluation.scenes import scene
 from p3i.grammar.ast import Polar
 from p3i.grammar.parser import parse
 from p3i.interp.unroll import nest, points
+from p3i.search import synthesize as synthesize_module
 from p3i.search.config import SearchConfig
+from p3i.search.extent.arc import as_far_as_it_goes
 from p3i.search.fit.places import measured
+from p3i.search.forms.guess import Guess
+from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
+from p3i.search.propose import proposers
 from p3i.search.result import NEEDED, StopReason
-from p3i.search.rings import _extended, find_rings, ring_filling
-from p3i.search.synthesize import synthesize
+from p3i.search.synthesize import searched, synthesize
 
 RING = DrawnRing()
 WORDS = ["--structure", "circular", "--focal", "35", "--format", "jsonl"]
@@ -61,26 +64,21 @@ def test_the_command_finds_the_ring_of_a_scene_where_rings_are_asked_for(
 
 
 def test_blotches_have_no_ring_that_would_be_an_answer() -> None:
-    session = Session(Evidence(noise_image(), SearchConfig(), 35.0), SearchConfig())
-    assert all(answer.score < NEEDED for answer in find_rings(session))
+    config = SearchConfig(structure="circular")
+    best = searched(Session(Evidence(noise_image(), config, 35.0), config))
+    assert best.found and all(answer.score < NEEDED for answer in best.asked())
 
 
-def test_a_search_whose_time_is_up_fits_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    from p3i.search import rings
-
-    session = Session(RING.evidence(), SearchConfig())
+def test_a_search_whose_time_is_up_fits_one_ring_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[Guess] = []
+    session = Session(RING.evidence(), SearchConfig(structure="circular"))
     session.stopped = StopReason.TIME_UP
-    monkeypatch.setattr(rings, "ring_proposals", lambda evidence, **_: [None] * 3)
-    assert find_rings(session) == []
-
-
-def test_a_search_of_another_photo_begins_without_the_rings_of_the_first() -> None:
-    session = Session(RING.evidence(), SearchConfig(focal_mm=35.0))
-    session.rings = ()
-    assert find_rings(session) == []
-    other = replace(session, evidence=Evidence(noise_image(), session.config, 35.0))
-    assert other.rings is None
-    assert session.rings == (), "and the first keeps its own"
+    numbers = RING.numbers(RING.filling())
+    guesses = [Guess(RING.filling(), numbers, 1.0, focal_mm=35.0)] * 3
+    monkeypatch.setattr(proposers, "ring_guesses", lambda _: guesses)
+    monkeypatch.setattr(synthesize_module, "fit_places", lambda _, guess: tried.append(guess))
+    searched(session)
+    assert len(tried) == 1
 
 
 @pytest.mark.parametrize(("drawn", "slots"), [(9, 14), (8, 12)])
@@ -90,8 +88,8 @@ def test_an_open_ring_is_drawn_as_far_as_it_goes(drawn: int, slots: int) -> None
     session, filling = session_on(ring), ring_filling(slots)
     whole = measured(session.evidence, filling, ring.numbers(filling), focal_mm=35.0)
     assert whole is not None
-    arc = _extended(session, whole)
-    draw = nest(arc.filling.program(arc.z, ())).draw
+    arc = as_far_as_it_goes(session, whole)
+    draw = nest(arc.program()).draw
     assert len(arc.filling.pattern.index) == drawn
     assert isinstance(draw.x, Polar)
     assert draw.x.angle.j == pytest.approx(360 / slots, rel=0.01)
@@ -103,7 +101,7 @@ def test_a_ring_fitted_with_one_object_too_few_grows_round_and_closes() -> None:
     session, filling = session_on(RING), ring_filling(11)
     wrong = measured(session.evidence, filling, RING.numbers(filling), focal_mm=35.0)
     assert wrong is not None
-    closed = _extended(session, wrong)
+    closed = as_far_as_it_goes(session, wrong)
     assert len(closed.filling.pattern.index) == 12
     assert "draw.x.angle.j" not in [unknown.name for unknown in closed.filling.moving], "the step is 360/12"
     assert closed.quality > 0.9 > 0.3 > wrong.quality
@@ -114,4 +112,4 @@ def test_a_closed_ring_with_a_gap_stays_closed() -> None:
     session, filling = session_on(ring), ring.filling()
     fit = measured(session.evidence, filling, ring.numbers(filling), focal_mm=35.0)
     assert fit is not None
-    assert _extended(session, fit) is fit
+    assert as_far_as_it_goes(session, fit) is fit

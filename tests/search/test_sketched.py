@@ -1,4 +1,4 @@
-"""Sketches that no family knows, on rendered scenes: the search sees nothing but the holes."""
+"""Sketches that a person wrote, on rendered scenes: the search sees nothing but the holes."""
 
 import functools
 import math
@@ -13,12 +13,14 @@ from p3i.evaluation.scene import Scene
 from p3i.grammar.leaves import leaves
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.camera import Camera
-from p3i.search import sketched
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.forms.guess import Found
+from p3i.search.fit.best import Best, Found
+from p3i.search.forms.guess import Guess
+from p3i.search.forms.sketches import by_hand, sketches
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
+from p3i.search.propose import holes
 from p3i.search.result import StopReason, SynthesisResult
 
 TRUTH = {
@@ -84,7 +86,7 @@ def center_errors(result: SynthesisResult, truth: Scene) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", TRUTH)
-def test_a_sketch_without_a_family_finds_camera_and_objects(kind: str) -> None:
+def test_a_sketch_with_holes_finds_camera_and_objects(kind: str) -> None:
     result, truth = filled(kind), scene(kind)
     assert pose_error_deg(result, truth) < 2.0
     assert len(result.centers) == len(truth.centers_px)
@@ -155,11 +157,11 @@ def test_a_sketch_that_cannot_fit_says_what_was_needed() -> None:
     assert "does not fit this photo (best 0.0" in result.reason and "needs" in result.reason
 
 
-def test_trace_tells_grid_and_fits() -> None:
+def test_the_trace_of_a_sketch_has_the_words_of_every_trace() -> None:
     steps: list[str] = []
     holes = sketch(TRUTH["staggered row"].replace("rx=-40", "rx=~-41"))
     p3i.synth(scene("staggered row").image(), sketch=holes, trace=lambda step: steps.append(step["step"]))
-    assert "grid" in steps and "fit" in steps
+    assert steps.index("sketch") < steps.index("proposal") < steps.index("fit") < steps.index("answer")
 
 
 @pytest.mark.parametrize(("off", "looked"), [(0.05, False), (0.6, True)])
@@ -167,18 +169,14 @@ def test_a_start_that_the_sketch_cannot_say_is_no_reason_to_look_no_further(
     monkeypatch: pytest.MonkeyPatch, off: float, looked: bool
 ) -> None:
     """A ring is near a spiral, and explains enough of it to seem sure."""
+    own = by_hand("the sketch", sketch(SKETCHES["spiral"]))
     near = Answer(p3i.loads(TRUTH["arc"]), "circular", 0.6, 0.6)
-    told: list[float] = []
-
-    def searched(*_: object, done: float, **__: object) -> list[Answer]:
-        told.append(done)
-        return []
-
-    monkeypatch.setattr(sketched, "_answers", lambda *_, **__: [near])
-    monkeypatch.setattr(sketched, "_searched", searched)
-    monkeypatch.setattr(sketched.PointMaps, "of", lambda _: None)
-    monkeypatch.setattr(sketched, "written_in", lambda every, _: Found(every[0], torch.zeros(0), 0, -off))
+    best = Best([Found(sketches(SearchConfig(structure="circular"))[0], None, (near,))])  # pyright: ignore
+    monkeypatch.setattr(holes, "_from_grid", lambda *_, **__: [])
+    monkeypatch.setattr(holes.PointMaps, "of", lambda _: None)
+    monkeypatch.setattr(holes, "written_in", lambda every, _: Guess(every[0], torch.zeros(0), -off))
     image = scene("spiral").image()
-    session = Session(Evidence(image, SearchConfig(), 35.0), SearchConfig())
-    sketched.find_by_sketch(session, sketch(SKETCHES["spiral"]), known=[near])
-    assert bool(told) == looked
+    rounds = holes.hole_guesses(Session(Evidence(image, SearchConfig(), 35.0), SearchConfig()), own, best)
+    assert len(next(rounds)) == 1
+    best.found.append(Found(own, None, (near,)))  # pyright: ignore[reportArgumentType]
+    assert (next(rounds, None) is not None) == looked

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from drawn import DrawnRing
+from found import finds
 from truth import PATTERN, SMALL, evidence_of, lattice_error, lattice_of, pose_error_deg, small_scene
 
 from p3i.evaluation.scenes import Scene
@@ -18,11 +19,9 @@ from p3i.grammar.departures import departures
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
-from p3i.search import lattices
 from p3i.search import synthesize as synthesize_module
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.families import Family
 from p3i.search.fit.grow import measure
 from p3i.search.judge import accept
 from p3i.search.result import NEEDED, StopReason, SynthesisResult
@@ -173,8 +172,8 @@ def test_an_interrupt_while_a_runner_up_is_worked_out_keeps_the_answer(
     scene = small_scene(QUICK)
     theta = lattice_of(scene.program).moved_to(np.median(scene.index, axis=0).round()).theta(PATTERN)
     fit = measure(evidence_of(scene).level_for(40.0), PATTERN, theta)
-    monkeypatch.setattr(lattices, "_grow_all", lambda session, pattern, fits: fits.extend([fit, fit]))
-    monkeypatch.setattr(lattices, "_same", lambda *_: False)
+    monkeypatch.setattr(synthesize_module, "_fitted", lambda *_, **__: [(None, fit), (None, fit)])
+    monkeypatch.setattr(synthesize_module, "same_lattice", lambda *_: False)
     stop = Interrupt("reading off the objects", turn=2)
     result = synthesize(scene.image(), SearchConfig(top=2), progress=stop)
     assert stop.left < 0, "the search should come that far"
@@ -183,11 +182,11 @@ def test_an_interrupt_while_a_runner_up_is_worked_out_keeps_the_answer(
 
 
 def answered_by(monkeypatch: pytest.MonkeyPatch, program: str, *, structure: str = "circular") -> None:
-    """Let the only family answer with this program, and a score beyond doubt."""
+    """Let the search find this program, with a score beyond doubt."""
     found = parse(program)
     assert isinstance(found, Program)
     answer = Answer(found, structure, 0.9, 0.9)  # pyright: ignore[reportArgumentType]
-    monkeypatch.setattr(synthesize_module, "FAMILIES", (Family("circular", lambda _: [answer]),))
+    finds(monkeypatch, answer)
 
 
 def test_a_program_that_costs_more_than_it_explains_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,7 +209,7 @@ def test_a_ring_that_the_extent_of_the_image_cannot_continue_says_so(monkeypatch
 
 
 def test_an_answer_whose_finished_program_scores_too_little_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the family that found it thought of it: no answer is printed with less than it needs."""
+    """Whatever who found it thought of it: no answer is printed with less than it needs."""
     answered_by(monkeypatch, "for j in range(0, 9):\n    Draw(x=9*Cos(40*j), y=9*Sin(40*j))\n")
     result = synthesize(photo(noise()), SearchConfig())
     assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn import DrawnRing
-from ringed import session_on
+from found import finds
+from ringed import found_on, searches_around
 from truth import small_scene
 
 import p3i
@@ -14,11 +15,9 @@ from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.search import hybrids, rings
-from p3i.search import synthesize as synthesize_module
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.families import Family
+from p3i.search.propose import rings
 from p3i.search.propose.votes import RingProposal
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.search.synthesize import synthesize
@@ -65,8 +64,7 @@ def test_a_strict_ring_is_in_table_1_and_says_how_far_it_is_off(
 
 def hybrid_found(kind: str, seed: int, of: int, monkeypatch: pytest.MonkeyPatch) -> SynthesisResult:
     scene = hybrid_scene(seed, kind=kind)
-    known = session_on(scene, of=of).rings
-    monkeypatch.setattr(hybrids, "found_rings", lambda _: known)
+    searches_around(monkeypatch, found_on(scene, of=of))
     return synthesize(scene.image(), SearchConfig(structure="hybrid", focal_mm=35.0, strict=True, top=3))
 
 
@@ -95,9 +93,9 @@ SPIRAL = (
 )
 
 
-def test_no_family_gets_a_program_past_table_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_proposer_gets_a_program_past_table_1(monkeypatch: pytest.MonkeyPatch) -> None:
     spiral = Answer(p3i.loads(SPIRAL), "circular", 0.9, 0.9)
-    monkeypatch.setattr(synthesize_module, "FAMILIES", (Family("circular", lambda _: [spiral]),))
+    finds(monkeypatch, spiral)
     image = OFF_PHASE.image()
     result = synthesize(image, SearchConfig(strict=True))
     assert (result.program, result.stop) == (None, StopReason.OUTSIDE_TABLE_1)
@@ -111,8 +109,7 @@ def test_an_answer_says_that_something_else_was_found_outside_table_1(
     text += "    Draw(x=24*Cos(30*j) + 4, y=24*Sin(30*j) - 3)\n"
     inside = Answer(p3i.loads(text), "circular", 0.5, 0.5)
     outside = replace(inside, program=p3i.loads(SPIRAL), structure="hybrid", score=0.9)
-    families = Family("circular", lambda _: [inside]), Family("hybrid", lambda _: [outside], "circular")
-    monkeypatch.setattr(synthesize_module, "FAMILIES", families)
+    finds(monkeypatch, inside, outside)
     result = synthesize(ring.image(), SearchConfig(strict=True))
     is_in_table1(result)
     assert any("a hybrid would be an answer without strict" in note for note in result.notes)

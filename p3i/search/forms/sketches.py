@@ -85,7 +85,7 @@ def sketches(config: SearchConfig) -> list[Sketched]:
         return [one for one in taken if one.shape == "lattice"]
     if config.exhaustive_s is None:
         taken = [one for one in taken if one.shape not in WALKED_SHAPES]
-    taken.sort(key=lambda one: STRUCTURES.index(one.structure))
+    taken.sort(key=lambda one: (one.shape in WALKED_SHAPES, STRUCTURES.index(one.structure)))
     if config.structure == "auto":
         return taken
     wanted = [one for one in taken if one.structure == config.structure]

@@ -115,7 +115,7 @@ def true_layout(seed: int) -> Layout:
 def test_a_filling_layout_covers_the_picture() -> None:
     scene = small_scene(14)
     middle = Layout(true_layout(14).lattice, (0, 1), (0, 1))
-    filling = filling_layout(evidence_of(scene), PATTERN, middle)
+    filling = filling_layout(evidence_of(scene), middle)
     assert filling.guards == ()
     size = scene.size
     index = torch.cartesian_prod(*[torch.arange(-15, 16, dtype=torch.float64)] * 2)
@@ -153,7 +153,7 @@ def test_the_true_layout_explains_the_photo_and_a_shifted_basis_does_not() -> No
     wrong = layout.lattice.with_basis(layout.lattice.basis * 1.3)
     wrong_fit = layout_fit(evidence_of(scene), Layout(wrong, layout.i_range, layout.j_range))
     assert true_fit is not None and float(true_fit.contrast.mean()) > 0.5
-    assert wrong_fit is None or wrong_fit.score < 0.1 * true_fit.score
+    assert wrong_fit is None or wrong_fit.covered < 0.1 * true_fit.covered
 
 
 def test_fewer_than_four_objects_are_no_pattern() -> None:
@@ -166,7 +166,7 @@ def test_the_last_fit_moves_a_layout_back_onto_its_objects() -> None:
     off = Lattice(
         layout.lattice.rx_deg + 1.0, layout.lattice.ry_deg - 0.5, layout.lattice.basis, layout.lattice.origin
     )
-    found = refitted(evidence_of(scene), PATTERN, Layout(off, layout.i_range, layout.j_range, ((1, 1, -99),)))
+    found = refitted(evidence_of(scene), Layout(off, layout.i_range, layout.j_range, ((1, 1, -99),)))
     assert abs(found.lattice.rx_deg - layout.lattice.rx_deg) < 0.5
     assert abs(found.lattice.ry_deg - layout.lattice.ry_deg) < 0.5
     assert (found.i_range, found.j_range, found.guards) == (layout.i_range, layout.j_range, ((1, 1, -99),))
@@ -179,6 +179,6 @@ def test_objects_that_the_frame_cuts_tell_the_pose_too(seed: int) -> None:
     index = torch.from_numpy(scene.index)
     low, high = index.min(0).values.tolist(), (index.max(0).values + 1).tolist()
     layout = Layout(lattice_of(scene.program), (low[0], high[0]), (low[1], high[1]))
-    found = refitted(evidence_of(scene), PATTERN, layout).lattice
+    found = refitted(evidence_of(scene), layout).lattice
     cosine = np.dot(scene.camera.normal, Camera(found.rx_deg, found.ry_deg).normal)
     assert np.degrees(np.arccos(cosine)) < 0.6

@@ -1,5 +1,7 @@
 """The primitive cell: a multiple comes back to the true cell, a part of a chequered floor to the whole."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ from truth import PATTERN, evidence_of, index_in, lattice_error, lattice_of, sma
 from p3i.interp.camera import image_from_plane
 from p3i.search.config import SearchConfig
 from p3i.search.extent.primitive import _Ground, _likeness, _told, primitive
-from p3i.search.fit.grow import Fit, measure, side_of_cell
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.grow import measure, side_of_cell
 from p3i.search.forms.lattice import Lattice
 from p3i.search.look.evidence import Evidence
 from p3i.size import Size
@@ -21,7 +24,7 @@ def fit_of(evidence: Evidence, lattice: Lattice) -> Fit:
     theta = lattice.theta(PATTERN)
     fit = measure(evidence.level_for(side_of_cell(evidence, PATTERN, theta)), PATTERN, theta)
     assert fit is not None
-    return Fit(theta, fit.index, torch.ones(len(fit.index)), fit.score)
+    return replace(fit, contrast=torch.ones(len(fit.index)))
 
 
 @pytest.mark.parametrize("factors", [[[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]], [[2, 0], [0, 2]]])
@@ -33,7 +36,7 @@ def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]])
     own = index_in(scene).numpy()
     steps = ground.index.numpy() @ factors
     inside = torch.from_numpy(((steps > own.min(0)) & (steps < own.max(0))).all(1))
-    ground = Fit(ground.theta, ground.index[inside], ground.contrast[inside], ground.score)
+    ground = replace(ground, index=ground.index[inside], contrast=ground.contrast[inside])
     theta, index = primitive(evidence_of(scene), PATTERN, ground)[-1]
     assert lattice_error(Lattice.of(PATTERN, theta).basis, truth.basis) < 1e-6
     # The new cells lie on the ground of the old ones, all of it.
@@ -113,7 +116,7 @@ def test_the_full_cell_of_a_chequered_floor_stays() -> None:
 def test_too_few_cells_say_nothing() -> None:
     scene = small_scene(16)
     fit = fit_of(evidence_of(scene), Lattice.of(PATTERN, true_theta(scene)))
-    few = Fit(fit.theta, fit.index[:3], fit.contrast[:3], fit.score)
+    few = replace(fit, index=fit.index[:3], contrast=fit.contrast[:3])
     [(theta, index)] = primitive(evidence_of(scene), PATTERN, few)
     assert torch.equal(theta, few.theta) and len(index) == 3
 

@@ -17,15 +17,15 @@ from truth import (
 
 from p3i.search.config import SearchConfig
 from p3i.search.fit.grow import grow, measure, sane, side_of_cell
-from p3i.search.forms.guess import Proposal
+from p3i.search.forms.guess import lattice_guess
 from p3i.search.forms.lattice import Lattice
 from p3i.search.look.evidence import Evidence
 from p3i.vision.image import Image
 
 
 def grown(lattice: Lattice, evidence: Evidence, *, seed: int = 0):
-    proposal = Proposal(lattice, worth=1.0, local=False)
-    return grow(evidence, PATTERN, proposal, generator=torch.Generator().manual_seed(seed))
+    guess = lattice_guess(lattice, 1.0, local=False)
+    return grow(evidence, guess, generator=torch.Generator().manual_seed(seed))
 
 
 @pytest.mark.parametrize(("rx_deg", "ry_deg", "scale"), [(4.0, -3.0, 1.0), (-3.0, 4.0, 1.02)])
@@ -42,7 +42,7 @@ def test_a_proposal_some_degrees_off_grows_to_the_whole_pattern(
     assert int(fit.support.sum()) > 0.75 * len(scene.index)
     # Its score is a share of the picture: less than what the true objects' hull takes of it.
     hull = cv2.contourArea(cv2.convexHull(scene.centers_px.astype(np.float32)))
-    assert 0.1 * hull < fit.score * scene.size.width * scene.size.height < 2 * hull
+    assert 0.1 * hull < fit.covered * scene.size.width * scene.size.height < 2 * hull
 
 
 def test_growing_twice_from_one_seed_is_the_same_to_the_last_digit() -> None:
@@ -50,7 +50,7 @@ def test_growing_twice_from_one_seed_is_the_same_to_the_last_digit() -> None:
     start = turned(Lattice.of(PATTERN, true_theta(scene)), rx_deg=2.0)
     first, again = (grown(start, evidence_of(scene), seed=3) for _ in range(2))
     assert first is not None and again is not None
-    assert torch.equal(first.theta, again.theta) and first.score == again.score
+    assert torch.equal(first.theta, again.theta) and first.covered == again.covered
 
 
 def test_the_truth_explains_more_than_what_is_beside_it() -> None:
@@ -61,7 +61,7 @@ def test_the_truth_explains_more_than_what_is_beside_it() -> None:
         theta = lattice.theta(PATTERN)
         level = evidence.level_for(side_of_cell(evidence, PATTERN, theta))
         fit = measure(level, PATTERN, theta, start=index_in(scene))
-        return 0.0 if fit is None else fit.score
+        return 0.0 if fit is None else fit.covered
 
     best = score(truth)
     assert best > 0.1

@@ -7,7 +7,7 @@ import torch
 from drawn import DrawnRing, tilt_error_deg
 
 from p3i.search.fit.places import FOCALS_MM, Fit, curve_score, follow, measured, registered
-from p3i.search.rings import ring_filling
+from p3i.search.forms.spelled import ring_filling
 
 RING = DrawnRing()
 

@@ -15,9 +15,10 @@ from p3i.evaluation.program_scenes import program_scene
 from p3i.grammar.leaves import leaves
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.unroll import live_indices
-from p3i.search import asked
+from p3i.search import synthesize as synthesize_module
 from p3i.search.forms.filling import Filling, fillings, unknowns_of
 from p3i.search.forms.settings import best_setting, check_settings, drawn_by, widened
+from p3i.search.forms.sketches import by_hand
 from p3i.search.result import StopReason
 from p3i.size import Size
 
@@ -46,7 +47,7 @@ def filling_of(text: str) -> Filling:
 def test_a_sketch_is_searched_however_many_objects_its_smallest_setting_draws(
     monkeypatch: pytest.MonkeyPatch, least: int
 ) -> None:
-    monkeypatch.setattr(asked, "_by_family", lambda *_: [])
+    monkeypatch.setattr(synthesize_module, "sketches", lambda config: [by_hand("the sketch", config.sketch)])
     truth = p3i.loads(BOARD.format(rx=-30, n=11, step=8))
     image = program_scene(truth, 2, look="flower", size=Size(400, 300)).image()
     holes = sketch(BOARD.format(rx="??(-35, -25)", n=f"??({least}, 13)", step="??(7.5, 8.5)"))

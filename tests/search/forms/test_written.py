@@ -54,7 +54,7 @@ def test_a_free_sketch_says_all_that_the_answer_says(
 ) -> None:
     answer = lattice(u, v, skew, x, y)
     found = written_in(every(LATTICE), answer)
-    assert found is not None and found.score == pytest.approx(0, abs=1e-9)
+    assert found is not None and found.promise == pytest.approx(0, abs=1e-9)
     said = dict(zip(found.filling.pattern.paths, found.filling.theta(found.z).tolist(), strict=True))
     pattern = compile(answer)
     assert said == pytest.approx(dict(zip(pattern.paths, pattern.theta.tolist(), strict=True)))
@@ -65,7 +65,7 @@ def test_numbers_that_a_sketch_ties_become_their_mean() -> None:
     assert found is not None
     said = dict(zip(found.filling.pattern.paths, found.filling.theta(found.z).tolist(), strict=True))
     assert said["draw.x.i"] == said["draw.y.j"] == pytest.approx(10)
-    assert found.score < 0, "the sketch cannot say it exactly"
+    assert found.promise < 0, "the sketch cannot say it exactly"
 
 
 def test_limits_that_a_person_gave_hold() -> None:

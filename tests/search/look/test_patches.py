@@ -9,6 +9,7 @@ from drawn import DrawnRing
 from p3i.grammar.ast import Program
 from p3i.grammar.parser import parse
 from p3i.interp.compile import compile
+from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.cells import agreement
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import (
@@ -21,7 +22,6 @@ from p3i.search.look.patches import (
     sample_px,
     spacing,
 )
-from p3i.search.rings import ring_filling
 
 RING = DrawnRing()
 FILLING = RING.filling()

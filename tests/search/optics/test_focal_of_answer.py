@@ -5,16 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from found import finds
 
 from p3i import api
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search import synthesize as synthesis
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.families import Family
 from p3i.search.judge import accept
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.session import Session
 from p3i.search.synthesize import centers_px, focal_of
 from p3i.vision.image import Image
 
@@ -29,13 +28,10 @@ def image() -> Image:
 
 
 def with_answers(monkeypatch: pytest.MonkeyPatch, *answers: Answer) -> None:
-    def find(session: Session) -> list[Answer]:
-        return list(answers)
-
     def as_found(_evidence: Evidence, found: Sequence[Sequence[Answer]], *, needed: float) -> list[Answer]:
         return [answer for family in found for answer in family if answer.score >= needed]
 
-    monkeypatch.setattr(synthesis, "FAMILIES", (Family("lattice", find),))
+    finds(monkeypatch, *answers)
     # The picture is noise, which no program explains: what an answer is worth is as the test says.
     monkeypatch.setattr(synthesis, "by_explained", as_found)
     monkeypatch.setattr(accept, "score_of_program", lambda *_, **__: 0.9)

@@ -5,15 +5,15 @@ from truth import PATTERN, evidence_of, lattice_error, lattice_of, normal, pose_
 
 from p3i.interp.camera import Camera
 from p3i.search.config import SearchConfig
-from p3i.search.forms.guess import Proposal, tilted
+from p3i.search.forms.guess import lattice_guess, tilted
 from p3i.search.forms.lattice import Lattice, map_from_index
 from p3i.search.look.evidence import Evidence
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.windows import (
     MOST_TILT_DEG,
     POSE_STEP_DEG,
-    straightened_proposals,
-    window_proposals,
+    straightened_guesses,
+    window_guesses,
 )
 from p3i.vision.image import Image
 
@@ -34,8 +34,8 @@ def test_the_poses_begin_straight_on_and_cover_all_tilts_up_to_sixty() -> None:
 def test_a_straightened_view_shows_the_lattice_near_the_true_pose() -> None:
     for seed in (14, 18):
         scene = small_scene(seed)
-        proposals = straightened_proposals(evidence_of(scene))
-        worths = [proposal.worth for proposal in proposals]
+        proposals = straightened_guesses(evidence_of(scene))
+        worths = [proposal.promise for proposal in proposals]
         assert worths == sorted(worths, reverse=True)
         truth = lattice_of(scene.program)
         near = [
@@ -69,7 +69,7 @@ def origin_px(lattice: Lattice) -> np.ndarray:
 
 def test_a_window_shows_the_steps_of_its_place() -> None:
     scene = small_scene(14)
-    proposals = window_proposals(evidence_of(scene))
+    proposals = window_guesses(evidence_of(scene))
     assert proposals and all(proposal.local for proposal in proposals)
     truth = lattice_of(scene.program)
     errors = []
@@ -85,9 +85,9 @@ def test_a_tilted_proposal_keeps_its_place_and_its_steps_in_the_photo() -> None:
     flat = Lattice(0.0, 0.0, np.array([[7.0, 1.0], [-2.0, 9.0]]), np.array([12.0, -9.0]))
     for rx, ry in ((30.0, 0.0), (-20.0, 35.0), (0.0, -50.0)):
         found = tilted(
-            Proposal(flat, 0.7, local=True), rx_deg=rx, ry_deg=ry, focal_mm=35.0, size=level.photo_size
+            lattice_guess(flat, 0.7, local=True), rx_deg=rx, ry_deg=ry, focal_mm=35.0, size=level.photo_size
         )
-        assert (found.worth, found.local) == (0.7, True)
+        assert (found.promise, found.local) == (0.7, True)
         assert (found.lattice.rx_deg, found.lattice.ry_deg) == (rx, ry)
         at = origin_px(flat)
         np.testing.assert_allclose(origin_px(found.lattice), at, atol=1e-6)
@@ -97,13 +97,13 @@ def test_a_tilted_proposal_keeps_its_place_and_its_steps_in_the_photo() -> None:
 def test_a_picture_smaller_than_a_window_has_no_window() -> None:
     pixels = np.random.default_rng(0).uniform(size=(31, 200, 3)).astype(np.float32)
     image = Image(pixels, np.ones((31, 200), bool))
-    assert window_proposals(Evidence(image, SearchConfig(), 35.0)) == []
+    assert window_guesses(Evidence(image, SearchConfig(), 35.0)) == []
 
 
 def test_windows_without_known_pixels_are_left_out() -> None:
     scene = small_scene(14)
     valid = np.zeros((scene.size.height, scene.size.width), bool)
     valid[:, : scene.size.width // 2] = True
-    found = window_proposals(Evidence(Image(scene.image().pixels, valid), SearchConfig(), 35.0))
+    found = window_guesses(Evidence(Image(scene.image().pixels, valid), SearchConfig(), 35.0))
     assert found
     assert all(origin_px(proposal.lattice)[0] < 0.6 * scene.size.width for proposal in found)

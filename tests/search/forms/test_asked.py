@@ -1,4 +1,4 @@
-"""What is searched when a person asks for something else than the families."""
+"""What is searched when a person asks for something."""
 
 import pytest
 from truth import pose_error_deg, small_scene
@@ -8,11 +8,10 @@ from p3i.errors import SketchError
 from p3i.evaluation.program_scenes import program_scene
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.camera import Camera
-from p3i.search import asked, sketched
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.look.evidence import Evidence
-from p3i.search.look.session import Session
+from p3i.search.forms import asked
+from p3i.search.propose import holes
 from p3i.search.result import NEEDED, StopReason
 from p3i.search.synthesize import synthesize
 from p3i.size import Size
@@ -26,17 +25,18 @@ def sketch(text: str) -> Sketch:
     return found
 
 
-def test_without_a_wish_the_families_are_asked() -> None:
-    assert asked.asked_for(SearchConfig()) is None
-    assert asked.asked_for(SearchConfig(exhaustive_s=3)) is None
+def test_without_a_wish_an_answer_needs_what_it_always_needs() -> None:
+    assert not asked.asks_for_itself(SearchConfig()) and not asked.asks_for_itself(
+        SearchConfig(exhaustive_s=3)
+    )
     assert asked.why_not(SearchConfig()) is StopReason.NO_PATTERN
     assert asked.needed_for(SearchConfig()) == NEEDED
 
 
-def test_a_sketch_a_start_and_a_recipe_take_the_place_of_the_families() -> None:
+def test_a_sketch_a_start_and_a_recipe_say_what_to_look_for() -> None:
     holes = sketch(ROW.replace("rx=-30", "rx=??"))
     for config in (SearchConfig(sketch=holes), SearchConfig(start=p3i.loads(ROW))):
-        assert asked.asked_for(config) is not None
+        assert asked.asks_for_itself(config)
         assert asked.why_not(config) is StopReason.NO_FIT
         assert asked.needed_for(config) == NEEDED
     assert asked.needed_for(SearchConfig(recipe="paper")) == 0
@@ -50,9 +50,9 @@ def test_the_focal_in_the_header_of_a_sketch_counts() -> None:
     assert p3i.synth(image, sketch=sketch(text), focal_mm=28).focal_mm == 28
 
 
-def test_a_sketch_of_what_a_family_draws_starts_from_its_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sketch_of_what_others_draw_starts_from_their_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight holes without bounds: no grid finds them, and none is looked through here."""
-    monkeypatch.setattr(sketched, "_searched", lambda *args, **options: [])
+    monkeypatch.setattr(holes, "_from_grid", lambda *_, **__: [])
     scene = small_scene(14)
     free = sketch(
         "SetCameraPose(rx=??, ry=??)\nfor i in range(0, ??):\n    for j in range(0, ??):\n"
@@ -69,31 +69,18 @@ def test_an_answer_with_a_focal_of_its_own_keeps_its_vanishing_line_under_the_as
     ring = p3i.loads(
         "SetCameraPose(rx=30, ry=10)\nfor j in range(0, 8):\n    Draw(x=9*Cos(45*j), y=9*Sin(45*j))\n"
     )
-    one = asked._refocused(Answer(ring, "circular", 0.5, 0.5, focal_mm=60.0), 35.0)
+    one = holes._refocused(Answer(ring, "circular", 0.5, 0.5, focal_mm=60.0), 35.0)
     size = Size(400, 300)
     own = Camera.of(ring, focal_mm=60.0).horizon(size)
     now = Camera.of(one.program, focal_mm=35.0).horizon(size)
     assert one.focal_mm is None and own is not None and now == pytest.approx(own)
-    assert asked._refocused(one, 50.0) is one
+    assert holes._refocused(one, 50.0) is one
 
 
 def test_a_start_that_was_found_through_a_lens_is_refused_and_not_bent_in_silence() -> None:
     text = "# /// p3p\n# version = 1\n# lens_k1 = -0.1\n# ///\n" + ROW
     with pytest.raises(SketchError, match="has a lens"):
         asked.check_asked(SearchConfig(start=p3i.loads(text)), Size(400, 300))
-
-
-def test_the_walk_tries_the_shortest_sketches_that_no_family_covers(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried: list[str] = []
-    monkeypatch.setattr(asked, "find_by_sketch", lambda session, sketch, effort: [])
-    image = program_scene(p3i.loads(ROW), 0, size=Size(160, 120)).image()
-    config = SearchConfig(exhaustive_s=60)
-    session = Session(
-        Evidence(image, config, 35.0), config, trace=lambda step: tried.append(str(step.get("name")))
-    )
-    assert asked.walk(session) == []
-    assert tried.index("row") < tried.index("spiral") < tried.index("spiral with a phase")
-    assert "lattice" not in tried
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ import torch
 import p3i
 from p3i.evaluation.program_scenes import program_scene
 from p3i.interp.compile import compile
-from p3i.search import paper
 from p3i.search.config import SearchConfig
 from p3i.search.judge.evaluate import evaluate
 from p3i.search.look.evidence import COARSE, Evidence
+from p3i.search.propose import paper
 from p3i.size import Size
 
 # Its loops reach beyond the picture on all sides.
@@ -64,7 +64,7 @@ def test_descent_lowers_the_loss(monkeypatch: pytest.MonkeyPatch) -> None:
     for steps in (0, 20):
         monkeypatch.setattr(paper, "STEPS", steps)
         seen: list[float] = []
-        note = lambda step, seen=seen: seen.append(step["loss"]) if "loss" in step else None  # noqa: E731
+        note = lambda step, seen=seen: seen.append(-step["worth"]) if "worth" in step else None  # noqa: E731
         p3i.synth(scene().image(), recipe="paper", trace=note)
         losses[steps] = min(seen)
     assert losses[20] < losses[0]
