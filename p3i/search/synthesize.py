@@ -114,28 +114,38 @@ def _drawn(look: Session, sketch: Sketched, guess: Guess, fit: Fit) -> Drawn | N
 def _fitted(look: Session, guesses: Iterable[Guess], *, most: int) -> list[Fitted]:
     """The guesses fitted, the most worth first, until time is up or a fit is certain."""
     fits: list[Fitted] = []
-    tried = idle = 0
+    tried = fitted = idle = 0
     with look.until_interrupted():
         for guess in guesses:
-            if tried >= most or (tried and not look.go_on()):
+            if fitted >= most or (tried and not look.go_on()):
                 break
             sure = any(certain(fit) for _, fit in fits)
             if sure and guess.promise < _RIVAL:
                 continue
-            if any(says_already(look.evidence, fit, guess) for _, fit in fits):
+            if any(says_already(look.evidence, own, fit, guess) for own, fit in fits):
                 continue
-            look.record("proposal", program=look.trace and proposed(guess), promise=guess.promise)
-            look.tell("refining", 0.3 + 0.5 * tried / most)
-            fit = look.completed(partial(fit_places, look, guess))
-            tried += fit is not None
+            look.tell("refining", 0.3 + 0.5 * fitted / most)
+            fit = look.completed(partial(_fit, look, guess))
+            tried, fitted = (
+                tried + 1,
+                fitted + (fit is not None),
+            )  # what cannot be begun costs next to nothing
             if fit is None or not holds(fit, guess):
                 continue
             idle = 0 if all(worth(fit) > worth(other) for _, other in fits) else idle + 1
             fits.append((guess, fit))
-            look.record("fit", program=look.trace and supported(fit), score=fit.mean, worth=worth(fit))
             if idle >= _TRIES_WHEN_CERTAIN and any(certain(fit) for _, fit in fits):
                 break
     return sorted(fits, key=lambda one: -worth(one[1]))
+
+
+def _fit(look: Session, guess: Guess) -> Fit | None:
+    """A guess fitted, and both told."""
+    look.record("proposal", program=look.trace and proposed(guess), promise=guess.promise)
+    fit = fit_places(look, guess)
+    if fit is not None:
+        look.record("fit", program=look.trace and supported(fit), score=fit.mean, worth=worth(fit))
+    return fit
 
 
 def _rivals(

@@ -136,7 +136,7 @@ IN_A_CALL = [
     ("ring", "extent.ring.places", 2),
     ("hybrid", "synthesize.fit_places", 2),
     ("hybrid", "extent.further_rings._one_more", 1),
-    ("hybrid", "extent.further_rings.measured", 2),
+    ("hybrid", "fit.fitting.measured", 2),
     ("hybrid", "judge.answered.explained_bits", 1),
     ("sketch", "propose.climb.score_points", 3),
     ("sketch", "propose.climb.distinct_share", 6),

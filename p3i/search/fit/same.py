@@ -9,9 +9,18 @@ from p3i.search.forms.lattice import Lattice, map_from_index
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.evidence import Evidence
 
+# Guesses of several rings are one where their radii differ by less than this share of the growth.
+_SAME_GROWTH = 0.1
 
-def says_already(evidence: Evidence, fit: Fit, guess: Guess) -> bool:
-    """Whether a fit of a lattice holds that of a guess already, or one that it is part of."""
+
+def says_already(evidence: Evidence, own: Guess, fit: Fit, guess: Guess) -> bool:
+    """Whether a fit, which began with its `own` guess, says what another guess is about to.
+
+    A lattice is said where it is the fit's, or a part or a multiple of it; of other forms, guesses are alike
+    but for small differences that a fit takes away.
+    """
+    if guess.base is not None:
+        return _alike(own, guess)
     if guess.filling is not fit.filling or not certain(fit):
         return False  # another start may do better
     level, pattern = evidence.frame, fit.pattern
@@ -56,3 +65,16 @@ def _whole_multiple(steps: np.ndarray, of: np.ndarray) -> bool:
     ratio = np.linalg.solve(of, steps)
     whole = np.round(ratio)
     return bool(np.abs(ratio - whole).max() < 0.15 and abs(np.linalg.det(whole)) >= 0.5)
+
+
+def _alike(first: Guess, second: Guess) -> bool:
+    """Whether two guesses write the same sketch, with radii that differ by little of their growth."""
+    if first.filling.sketch != second.filling.sketch:
+        return False
+    ours, theirs = (
+        dict(zip((unknown.name for unknown in one.filling.moving), one.z.tolist(), strict=True))
+        for one in (first, second)
+    )
+    names = ("draw.x.radius.i", "draw.x.radius.1")
+    apart = sum(abs(ours[name] - theirs[name]) for name in names if name in ours)
+    return apart < _SAME_GROWTH * theirs.get("draw.x.radius.i", 0.0)

@@ -1,6 +1,7 @@
 """Where lattices may be: guesses from views and from windows, the promising ones first and in turn."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from p3i.search.forms.guess import Guess
 from p3i.search.look.session import Session
@@ -13,9 +14,14 @@ _MOST = 10
 def lattice_guesses(look: Session) -> Iterator[Guess]:
     """The guesses of both kinds in turn, each kind's best first."""
     look.tell("looking through windows", 0.02)
-    windows = window_guesses(look.evidence)[:_MOST]
+    windows = _beside_the_best(window_guesses(look.evidence)[:_MOST])
     look.tell("straightening", 0.1)
-    views = straightened_guesses(look.evidence)[:_MOST]
+    views = _beside_the_best(straightened_guesses(look.evidence)[:_MOST])
     for place in range(_MOST):
         yield from views[place : place + 1]
         yield from windows[place : place + 1]
+
+
+def _beside_the_best(guesses: list[Guess]) -> list[Guess]:
+    """The guesses of one kind, the best first, each with its promise as a share of the best one's."""
+    return [replace(guess, promise=guess.promise / guesses[0].promise) for guess in guesses]

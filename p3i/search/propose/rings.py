@@ -51,11 +51,8 @@ def guesses_around(look: Session, rings: Sequence[Drawn]) -> Iterator[Guess]:
         done.append(base)
         closed = base.count * abs(base.step_deg) > _CLOSED_DEG
         for propose in (rings_around, ring_repeated) if closed else (rings_around,):
-            kept: list[HybridProposal] = []
             for proposal in sorted(propose(look.evidence, base), key=lambda proposal: -proposal.objects):
-                if not any(_alike(proposal, other) for other in kept):
-                    kept.append(proposal)
-                    yield _guess(ring, proposal)
+                yield _guess(ring, proposal)
 
 
 def _guess(ring: Drawn, proposal: HybridProposal) -> Guess:
@@ -97,11 +94,3 @@ def _same(first: BaseRing, second: BaseRing) -> bool:
     """Whether two rings lie about one centre and turn by the same step."""
     apart = float(np.hypot(*(first.center - second.center)))
     return apart < 0.1 * first.radius and abs(first.step_deg - second.step_deg) < 0.05 * abs(first.step_deg)
-
-
-def _alike(first: HybridProposal, second: HybridProposal) -> bool:
-    """Whether two proposals are the same but for small differences that a fit takes away."""
-    names = ("first", "last", "count", "counted_by_ring")
-    if any(getattr(first, name) != getattr(second, name) for name in names):
-        return False
-    return abs(first.growth - second.growth) + abs(first.radius - second.radius) < 0.1 * second.growth
