@@ -30,13 +30,13 @@ from p3i.errors import P3IError
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.families import FAMILIES
 from p3i.search.judge.accept import convincing, with_printed_scores
 from p3i.search.judge.bits import by_explained
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
-from p3i.search.result import NEEDED
-from p3i.search.synthesize import focal_of
+from p3i.search.outcome import focal_of
+from p3i.search.result import NEEDED, STRUCTURES
+from p3i.search.synthesize import searched
 from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
@@ -212,12 +212,9 @@ def measure(images: Iterable[tuple[str, Image]], config: SearchConfig, *, patter
         begun = time.process_time()
         try:
             evidence = Evidence(image, config, focal_of(image, config)[0])
-            session = Session(evidence, config)
-            answers = {
-                family.structure: family.find(session)
-                for family in FAMILIES
-                if config.structure in ("auto", family.structure)
-            }
+            wanted = STRUCTURES if config.structure == "auto" else (config.structure,)
+            alone = {one: dataclasses.replace(config, structure=one) for one in wanted}
+            answers = {one: list(searched(Session(evidence, alone[one])).asked()) for one in wanted}
             explained = by_explained(evidence, list(answers.values()), needed=NEEDED)
         except Exception as bug:
             print(f"{name:40} BUG {type(bug).__name__}: {bug}", flush=True)

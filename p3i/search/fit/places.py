@@ -154,7 +154,7 @@ def curve_score(fit: Fit) -> float:
 
 def values_of(fit: Fit) -> dict[str, float]:
     """The numbers of a fit by the names of their unknowns, such as draw.x.radius.1."""
-    return {unknown.name: value for unknown, value in zip(fit.filling.moving, fit.z.tolist(), strict=True)}
+    return fit.filling.named(fit.z)
 
 
 def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:

@@ -71,10 +71,7 @@ def _alike(first: Guess, second: Guess) -> bool:
     """Whether two guesses write the same sketch, with radii that differ by little of their growth."""
     if first.filling.sketch != second.filling.sketch:
         return False
-    ours, theirs = (
-        dict(zip((unknown.name for unknown in one.filling.moving), one.z.tolist(), strict=True))
-        for one in (first, second)
-    )
+    ours, theirs = (one.filling.named(one.z) for one in (first, second))
     names = ("draw.x.radius.i", "draw.x.radius.1")
     apart = sum(abs(ours[name] - theirs[name]) for name in names if name in ours)
     return apart < _SAME_GROWTH * theirs.get("draw.x.radius.i", 0.0)

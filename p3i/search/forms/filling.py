@@ -101,6 +101,10 @@ class Filling:
         """The width of each moving number's range, [F]."""
         return torch.tensor([u.range.upper - u.range.lower for u in self.moving]).double()
 
+    def named(self, z: Tensor) -> dict[str, float]:
+        """The moving numbers z [F] by the names of their unknowns, such as draw.x.radius.1."""
+        return {unknown.name: value for unknown, value in zip(self.moving, z.tolist(), strict=True)}
+
     def program(self, z: Tensor, setting: tuple[int, ...]) -> Program:
         """The sketch filled: numbers rounded as in every answer, limits kept, plain numbers as written."""
         found: dict[str, float] = {}
