@@ -5,8 +5,8 @@ python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then
 python benchmarks/refusals.py --out scores.json        # every score, by kind of pattern
 
 Every family of the search (lattices, rings, ...) looks at every picture, and the best score that each reaches
-is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the score and
-more bits than the program costs, or by the number of false alarms (docs/search.md). The crops are drawn from
+is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the number of
+false alarms (docs/search.md). The crops are drawn from
 a seed, so every run sees the same; a crop that shares more than half of their joint area with an earlier one
 of its photo is drawn anew. It needs scikit-image (the extra `bench`), but downloads nothing.
 """
@@ -31,7 +31,7 @@ from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
-from p3i.search.judge.accept import convincing, with_printed_scores
+from p3i.search.judge.accept import beyond_noise
 from p3i.search.judge.bits import by_explained
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
@@ -218,15 +218,14 @@ def measure(images: Iterable[tuple[str, Image]], config: SearchConfig, *, patter
                 for family in FAMILIES
                 if config.structure in ("auto", family.structure)
             }
-            explained = by_explained(evidence, list(answers.values()), needed=NEEDED)
+            explained = by_explained(evidence, list(answers.values()))
         except Exception as bug:
             print(f"{name:40} BUG {type(bug).__name__}: {bug}", flush=True)
             traceback.print_exc()
             continue
         seconds = round(time.process_time() - begun, 2)
         best = {structure: _best(some) for structure, some in answers.items()}
-        told = with_printed_scores(evidence, explained, needed=NEEDED)
-        answered = any(answer.worth > 0 for answer in convincing(explained, told, needed=NEEDED))
+        answered = any(beyond_noise(answer.worth) for answer in explained)
         bits = {one: _most_bits(explained, one) for one in answers}
         scores = Scores(name=name, pattern=pattern, best=best, bits=bits, answered=answered, seconds=seconds)
         found.append(scores)

@@ -88,15 +88,15 @@ def _result(
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(session, answers)
-    told = with_printed_scores(session.evidence, answers, needed=needed)
-    sure = convincing(answers, told, needed=needed, fills=config.extent_used == "image")
     # What a person asked for is theirs to choose, whatever it costs.
     asked = asked_for(config) is not None
-    seen = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
-    good = seen if asked else [answer for answer in seen if answer.worth > 0]
+    told = with_printed_scores(session.evidence, answers, needed=needed if asked else None)
+    sure = convincing(answers, told, needed=needed if asked else None)
+    good = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
     if not good:
         best = max((answer.score for answer in told), default=0.0)
-        reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
+        costly = not asked and best >= needed
+        reason = StopReason.OUT_OF_SIGHT if sure else StopReason.COSTS_MORE if costly else why_not(config)
         if session.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
         refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
@@ -130,13 +130,13 @@ def _result(
         score=first.score,
         margin=margin,
         needed=needed if by_score else None,
-        false_alarms=false_alarms(first.structure, first.worth),
+        false_alarms=None if asked else false_alarms(first.worth),
         candidates=tuple(
             Candidate(
                 program=answer.program,
                 score=answer.score,
                 structure=answer.structure,
-                false_alarms=false_alarms(answer.structure, answer.worth),
+                false_alarms=None if asked else false_alarms(answer.worth),
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
             for answer in good[: config.top]
@@ -184,9 +184,7 @@ def _found(session: Session) -> list[Answer]:
                 answers.append(family.find(session))
         if session.config.exhaustive_s is not None and session.go_on():
             answers.append(walk(session))
-    return session.completed(
-        lambda: by_explained(session.evidence, answers, needed=needed_for(session.config))
-    )
+    return session.completed(lambda: by_explained(session.evidence, answers))
 
 
 def _found_with_lens(session: Session) -> list[Answer]:
