@@ -11,6 +11,7 @@ from p3i.search.answer import Answer
 from p3i.search.extent.sector import Place, Ring, places
 from p3i.search.fit.places import CurveFit, curve_score, follow, measured, numbers_of, values_of
 from p3i.search.forms.filling import Filling, filling_of
+from p3i.search.judge.bits import explained_bits
 from p3i.search.look.session import Session
 from p3i.search.propose.votes import RingProposal, ring_proposals
 from p3i.search.result import StructureFound
@@ -19,9 +20,8 @@ from p3i.search.table1 import ring_in_table1
 # So many proposals are fitted, and so many fits are finished.
 _MOST_FITTED = 8
 _MOST_FINISHED = 2
-# So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
+# So many radii are tried for the objects.
 _MOST_PLACES = 2
-_MUCH_BETTER = 4.0
 # A free focal must lower the logarithm of the misfit, times the objects, by this much, or the quality rise by
 # this factor; misfits are taken to lie between these.
 _FOCAL_PAYS = 6.0
@@ -39,10 +39,11 @@ _MOST_GROWTHS = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundRing:
-    """A ring with its draws on its objects, and the score of its program."""
+    """A ring with its draws on its objects, the score of its program, and the bits that it explains."""
 
     fit: CurveFit
     score: float
+    bits: float
 
 
 def find_rings(session: Session) -> list[Answer]:
@@ -69,10 +70,11 @@ def found_rings(session: Session) -> tuple[FoundRing, ...]:
                 fit = ring_fit(session, proposal)
                 if fit is None:
                     continue
+                fit = _extended(session, fit)
                 fits.append(fit)
                 session.record("ring", program=fit.filling.program(fit.z, ()), score=fit.quality)
-        fits.sort(key=lambda fit: -curve_score(fit))  # a third of a ring agrees as well as all of it
-        session.rings = tuple(sorted(_all_finished(session, fits), key=lambda ring: -ring.score))
+        fits.sort(key=lambda fit: -_bits(session, fit))
+        session.rings = tuple(sorted(_all_finished(session, fits), key=lambda ring: -ring.bits))
     return session.rings
 
 
@@ -163,19 +165,22 @@ def _with_paid_focal(session: Session, fit: CurveFit) -> CurveFit:
     return fit if paid else kept
 
 
+def _bits(session: Session, fit: CurveFit) -> float:
+    return explained_bits(session.evidence, answer_of(session, fit, "circular", 0.0))
+
+
 def _finished(session: Session, fit: CurveFit) -> FoundRing:
-    """The ring as far as it goes, its draws put where the objects sit."""
-    fit = _with_paid_focal(session, _extended(session, fit))
-    # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
-    found, score = fit, curve_score(fit)
-    for rank, place in enumerate(places(session.evidence, _ring_of(session, fit))[:_MOST_PLACES]):
+    """The ring with its draws put where the objects sit: at the radius that explains most."""
+    fit = _with_paid_focal(session, fit)
+    found, score, most = fit, curve_score(fit), -math.inf
+    for place in places(session.evidence, _ring_of(session, fit))[:_MOST_PLACES]:
         moved = _moved(session, fit, place)
         if moved is None:
             continue
         score = max(score, curve_score(moved))
-        if rank == 0 or moved.mean > _MUCH_BETTER * found.mean:
-            found = moved
-    return FoundRing(found, score)
+        if (bits := _bits(session, moved)) > most:
+            found, most = moved, bits
+    return FoundRing(found, score, _bits(session, fit) if most == -math.inf else most)
 
 
 def _moved(session: Session, fit: CurveFit, place: Place) -> CurveFit | None:

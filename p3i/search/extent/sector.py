@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from p3i.search.extent.phase import WEIGHTS
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.recurrence import MOST_FALSE_ALARMS
 from p3i.search.look.unrolled import colours_at, gradients, polar_points
 from p3i.vision.cells import median_cell
 from p3i.vision.motif import concentration, contrast, parts, symmetry
@@ -103,6 +104,26 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
     return found
 
 
+def _within_one_kind(sectors: Sectors, rows: slice) -> Mask:
+    """Which columns [_SIDE] of a sector may be an object's middle, by how far objects differ from each other.
+
+    Where objects are of several kinds, as a dartboard's fields, a step about an object's middle holds one kind,
+    and its mean colour is that object's own; a step about a border holds half of each neighbour, and all are
+    alike. Means that vary V times as much in n objects save (n - 1) / 2 * log2 V bits.
+    """
+    lab, known = sectors.lab[rows], sectors.known[rows][..., None]
+    sums = (np.where(known, lab, 0)).sum(0), np.broadcast_to(known, lab.shape).sum(0)  # [N * _SIDE, 3] each
+    spread = np.empty(_SIDE)
+    for column in range(_SIDE):
+        # About the middle of this column; the seam of an open ring spoils one object of many.
+        colour, count = (
+            np.roll(table, _SIDE // 2 - column, 0).reshape(-1, _SIDE, 3).sum(1) for table in sums
+        )
+        spread[column] = (colour / np.maximum(count, 1)).var(0).sum()
+    lost = 0.5 * (lab.shape[1] // _SIDE - 1) * np.log2(spread.max() / np.maximum(spread, 1e-9))
+    return lost <= -math.log2(MOST_FALSE_ALARMS)
+
+
 def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
     """The photo about each object, unrolled: angle to the right, log radius down, alike in scale."""
     step = math.radians(ring.step_deg)
@@ -135,6 +156,7 @@ def _middle(
     }
     worth = sum(WEIGHTS[name] * cue for name, cue in cues.items()) + _PROFILE * profile[:, None]
     down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
-    worth = np.where(np.abs(down)[:, None] < _NEAR, worth, -np.inf)
+    allowed = (np.abs(down) < _NEAR)[:, None] & _within_one_kind(sectors, rows)
+    worth = np.where(allowed, worth, -np.inf)
     y, x = divmod(int(np.argmax(worth)), _SIDE)
     return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)

@@ -17,9 +17,7 @@ from dataclasses import replace
 from p3i.search.answer import Answer
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.look.evidence import Evidence
-
-MOST_FALSE_ALARMS = 0.05
-"""What fewer false alarms a picture than these say is no noise."""
+from p3i.search.look.recurrence import MOST_FALSE_ALARMS
 
 
 def false_alarms(bits: float) -> float:
