@@ -107,7 +107,7 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
 def _within_one_kind(sectors: Sectors, rows: slice) -> Mask:
     """Which columns [_SIDE] of a sector may be an object's middle, by how far objects differ from each other.
 
-    Where objects are of several kinds, as a dartboard's fields, a step about an object's middle holds one kind,
+    Where objects are of several kinds, as a dartboard's fields, a step about a middle holds one kind,
     and its mean colour is that object's own; a step about a border holds half of each neighbour, and all are
     alike. Means that vary V times as much in n objects save (n - 1) / 2 * log2 V bits.
     """
