@@ -32,8 +32,6 @@ _REACH = 1.55
 _LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
-# How much the profile speaks beside the cues of phase.py.
-_PROFILE = 6.0
 # The object's middle lies this close to the radius where most repeats, in sector sides.
 _NEAR = 0.17
 
@@ -98,7 +96,7 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
             break
         rows = slice(row - half, row + half)
         cell = np.asarray(template[:, rows], np.float32)
-        down, turn = _middle(sectors, ring, cell, rows, profile[rows] / profile[row])
+        down, turn = _middle(sectors, ring, cell, rows)
         radius = float(np.interp(row + down, np.arange(len(profile)), sectors.radii))
         found.append(Place(radius, turn * ring.step_deg))
     return found
@@ -137,9 +135,7 @@ def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
     return Sectors(colours_at(colours, at), known, radii)
 
 
-def _middle(
-    sectors: Sectors, ring: Ring, template: Floats, rows: slice, profile: Array
-) -> tuple[float, float]:
+def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tuple[float, float]:
     """The object's middle in a sector: samples down from the middle row, and turn in steps (-1/2 to 1/2).
 
     The cues take the cell for a torus, which it is along the arc; so only rows near the middle are asked.
@@ -154,7 +150,7 @@ def _middle(
         "parts": parts(median),
         "texture": concentration((template**2).sum(0)),
     }
-    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items()) + _PROFILE * profile[:, None]
+    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items())
     down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
     allowed = (np.abs(down) < _NEAR)[:, None] & _within_one_kind(sectors, rows)
     worth = np.where(allowed, worth, -np.inf)
