@@ -144,6 +144,7 @@ def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tupl
     weights = ring.weights.clip(0)  # where none is sure, all are asked
     sure = np.flatnonzero(weights >= 0.5 * weights.max())
     median, _ = median_cell(np.asarray(colours, np.float32), sectors.cut(sectors.known, rows), sure)
+    median = median - np.median(median, 2, keepdims=True)  # what is alike at every turn, a rim, is no object
     cues = {
         "symmetry": symmetry(template),
         "contrast": contrast(median),
