@@ -28,15 +28,15 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(look, answers)
-    printed = with_printed_scores(look.evidence, answers, needed=needed)
-    sure = convincing(answers, printed, needed=needed, fills=config.extent_used == "image")
     # What a person asked for is theirs to choose, whatever it costs.
     asked = asks_for_itself(config)
-    seen = sure if asked else [answer for answer in sure if _in_sight(look, answer)]
-    good = seen if asked else [answer for answer in seen if answer.worth > 0]
+    printed = with_printed_scores(look.evidence, answers, needed=needed if asked else None)
+    sure = convincing(answers, printed, needed=needed if asked else None)
+    good = sure if asked else [answer for answer in sure if _in_sight(look, answer)]
     if not good:
         best = max((answer.score for answer in printed), default=0.0)
-        reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
+        costly = not asked and best >= needed
+        reason = StopReason.OUT_OF_SIGHT if sure else StopReason.COSTS_MORE if costly else why_not(config)
         if look.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
         refused = told(config, assumed, None, look.stopped or reason, score=best, needed=needed)
@@ -70,13 +70,13 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         score=first.score,
         margin=margin,
         needed=needed if by_score else None,
-        false_alarms=false_alarms(first.structure, first.worth),
+        false_alarms=None if asked else false_alarms(first.worth),
         candidates=tuple(
             Candidate(
                 program=answer.program,
                 score=answer.score,
                 structure=answer.structure,
-                false_alarms=false_alarms(answer.structure, answer.worth),
+                false_alarms=None if asked else false_alarms(answer.worth),
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
             for answer in good[: config.top]

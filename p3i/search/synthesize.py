@@ -17,7 +17,7 @@ from p3i.search.fit.best import Best
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.fitting import certain, fit_places, holds, worth
 from p3i.search.fit.same import same_lattice, says_already
-from p3i.search.forms.asked import asks_for_itself, check_asked, needed_for
+from p3i.search.forms.asked import asks_for_itself, check_asked
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.sketches import Sketched, sketches
 from p3i.search.judge.answered import answers_of
@@ -176,7 +176,7 @@ def _answers(look: Session) -> list[Answer]:
 def _by_bits(look: Session, best: Best) -> list[Answer]:
     asked = sorted(best.asked(), key=lambda answer: -answer.worth)
     groups = [[one for one in asked if one.structure == structure] for structure in STRUCTURES]
-    answers = by_explained(look.evidence, groups, needed=needed_for(look.config))
+    answers = by_explained(look.evidence, groups)
     if asks_for_itself(look.config):
         return answers
     return with_note_of_others(look, best.fits, answers, finish=_finished)

@@ -1,30 +1,29 @@
-"""From a ring that was fitted to a program: how far it goes, and where on it the objects are."""
+"""From a ring that was fitted to a program: where on it the objects are."""
+
+import math
 
 import numpy as np
 
-from p3i.search.extent.arc import as_far_as_it_goes
 from p3i.search.extent.sector import Place, Ring, places
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
+from p3i.search.fit.saved import saved_bits
 from p3i.search.look.session import Session
 
-# So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
+# So many radii are tried for the objects.
 _MOST_PLACES = 2
-_MUCH_BETTER = 4.0
 
 
 def drawn_ring(look: Session, fit: Fit) -> Drawn:
-    """The ring as far as it goes, its draws put where the objects sit."""
-    fit = as_far_as_it_goes(look, fit)
-    # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
-    found, sure = fit, curve_score(fit)
-    for rank, place in enumerate(places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]):
+    """The ring with its draws put where the objects sit: at the radius that explains most."""
+    found, sure, most = fit, curve_score(fit), -math.inf
+    for place in places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]:
         moved = _moved(look, fit, place)
         if moved is None:
             continue
         sure = max(sure, curve_score(moved))
-        if rank == 0 or moved.mean > _MUCH_BETTER * found.mean:
-            found = moved
+        if (bits := saved_bits(look.evidence, moved)) > most:
+            found, most = moved, bits
     return Drawn(found.program(), found, sure)
 
 

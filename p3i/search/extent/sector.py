@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from p3i.search.extent.phase import WEIGHTS
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.recurrence import MOST_FALSE_ALARMS
 from p3i.search.look.unrolled import colours_at, gradients, polar_points
 from p3i.vision.cells import median_cell
 from p3i.vision.motif import concentration, contrast, parts, symmetry
@@ -31,8 +32,6 @@ _REACH = 1.55
 _LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
-# How much the profile speaks beside the cues of phase.py.
-_PROFILE = 6.0
 # The object's middle lies this close to the radius where most repeats, in sector sides.
 _NEAR = 0.17
 
@@ -97,10 +96,30 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
             break
         rows = slice(row - half, row + half)
         cell = np.asarray(template[:, rows], np.float32)
-        down, turn = _middle(sectors, ring, cell, rows, profile[rows] / profile[row])
+        down, turn = _middle(sectors, ring, cell, rows)
         radius = float(np.interp(row + down, np.arange(len(profile)), sectors.radii))
         found.append(Place(radius, turn * ring.step_deg))
     return found
+
+
+def _within_one_kind(sectors: Sectors, rows: slice) -> Mask:
+    """Which columns [_SIDE] of a sector may be an object's middle, by how far objects differ from each other.
+
+    Where objects are of several kinds, as a dartboard's fields, a step about a middle holds one kind,
+    and its mean colour is that object's own; a step about a border holds half of each neighbour, and all are
+    alike. Means that vary V times as much in n objects save (n - 1) / 2 * log2 V bits.
+    """
+    lab, known = sectors.lab[rows], sectors.known[rows][..., None]
+    sums = (np.where(known, lab, 0)).sum(0), np.broadcast_to(known, lab.shape).sum(0)  # [N * _SIDE, 3] each
+    spread = np.empty(_SIDE)
+    for column in range(_SIDE):
+        # About the middle of this column; the seam of an open ring spoils one object of many.
+        colour, count = (
+            np.roll(table, _SIDE // 2 - column, 0).reshape(-1, _SIDE, 3).sum(1) for table in sums
+        )
+        spread[column] = (colour / np.maximum(count, 1)).var(0).sum()
+    lost = 0.5 * (lab.shape[1] // _SIDE - 1) * np.log2(spread.max() / np.maximum(spread, 1e-9))
+    return lost <= -math.log2(MOST_FALSE_ALARMS)
 
 
 def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
@@ -116,9 +135,7 @@ def _sectors(evidence: Evidence, ring: Ring) -> Sectors:
     return Sectors(colours_at(colours, at), known, radii)
 
 
-def _middle(
-    sectors: Sectors, ring: Ring, template: Floats, rows: slice, profile: Array
-) -> tuple[float, float]:
+def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tuple[float, float]:
     """The object's middle in a sector: samples down from the middle row, and turn in steps (-1/2 to 1/2).
 
     The cues take the cell for a torus, which it is along the arc; so only rows near the middle are asked.
@@ -127,14 +144,16 @@ def _middle(
     weights = ring.weights.clip(0)  # where none is sure, all are asked
     sure = np.flatnonzero(weights >= 0.5 * weights.max())
     median, _ = median_cell(np.asarray(colours, np.float32), sectors.cut(sectors.known, rows), sure)
+    median = median - np.median(median, 2, keepdims=True)  # what is alike at every turn, a rim, is no object
     cues = {
         "symmetry": symmetry(template),
         "contrast": contrast(median),
         "parts": parts(median),
         "texture": concentration((template**2).sum(0)),
     }
-    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items()) + _PROFILE * profile[:, None]
+    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items())
     down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
-    worth = np.where(np.abs(down)[:, None] < _NEAR, worth, -np.inf)
+    allowed = (np.abs(down) < _NEAR)[:, None] & _within_one_kind(sectors, rows)
+    worth = np.where(allowed, worth, -np.inf)
     y, x = divmod(int(np.argmax(worth)), _SIDE)
     return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)

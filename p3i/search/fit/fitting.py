@@ -2,6 +2,7 @@
 
 import torch
 
+from p3i.search.fit.arc import as_far_as_it_goes
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import grow
 from p3i.search.fit.places import curve_score, follow, measured, settled
@@ -46,7 +47,7 @@ def fit_places(look: Session, guess: Guess) -> Fit | None:
         return followed_within(look.evidence, filling, guess.z, rounds=_ROUNDS_WITHIN)
     if guess.base is None:
         start = measured(look.evidence, guess.filling, guess.z, focal_mm=guess.focal_mm)
-        return None if start is None else settled(look, start, rounds=_ROUNDS)
+        return None if start is None else as_far_as_it_goes(look, settled(look, start, rounds=_ROUNDS))
     # Where the rings of a fan lie far apart, patches as wide as its draws do are too wide for its inner ring.
     side = min(spacing(guess.filling.pattern, guess.theta), guess.base.side)
     start = measured(look.evidence, guess.filling, guess.z, focal_mm=guess.focal_mm, side=side)

@@ -122,12 +122,12 @@ def colours_at(colours: ColourMap, at: Floats) -> Floats:
 def double_angle(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """sqrt(|grad|), and that times the cosine and the sine of twice the direction, of all colours together.
 
-    Shapes: gx, gy [H, W, 3] -> three [H, W]; as vision/oriented.py has it for each colour.
+    Shapes: gx, gy [..., 3] -> three [...]; as vision/oriented.py has it for each colour.
     """
-    squared = (gx * gx + gy * gy).sum(2)
+    squared = (gx * gx + gy * gy).sum(-1)
     root = squared**0.25
     factor = root / (squared + _FLOOR**2)
-    return root, (gx * gx - gy * gy).sum(2) * factor, 2 * (gx * gy).sum(2) * factor
+    return root, (gx * gx - gy * gy).sum(-1) * factor, 2 * (gx * gy).sum(-1) * factor
 
 
 def gradients(lab: NDArray) -> Floats:

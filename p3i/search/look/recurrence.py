@@ -1,0 +1,231 @@
+"""How surely a photo comes again at a program's steps: evidence in bits, under a noise model of its own.
+
+The null hypothesis is a picture in which no turn (of a ring) and no shift (of a row) is better than another.
+Each object's sector is read off the plane: one step along the curve, as much across it. What is the same at
+every turn, a rim, and what changes slowly, a shade, is taken out of it (a mean over one step has neither),
+and the rest told in waves along the curve: wave m has m periods a step. The waves of different sectors are
+independent under the null, whatever the picture's own texture, for these are its Fourier coefficients about
+m/step; a pattern alone has the same waves in every sector. So of N sectors the mean one's share r of all
+energy is what tells, and the generalised likelihood ratio of "the mean has an energy of its own" against
+"no" is, for D independent samples,
+
+    D * (-N ln N - ln r - (N - 1) ln(1 - r) + (N - 1) ln(N - 1)),    r > 1/N.
+
+D is read off the photo itself: what the sectors do not share is noise, and unrelated vectors of D independent
+samples have a mean squared cosine of 1/D. So neither overlapping patches, nor one edge seen in all rows of a
+sector, nor enlarged pixels count for more than they are.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from p3i.interp.camera import project
+from p3i.interp.pattern import Pattern
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.unrolled import double_angle
+from p3i.vision.warp import sample, sample_valid
+
+Floats = NDArray[np.float32]
+
+MOST_FALSE_ALARMS = 0.05
+"""What is expected less often than this in a picture without a pattern is no chance."""
+ALONG = 16
+"""Samples along a sector; waves up to half as many can be told."""
+ACROSS = 14
+"""Samples across a sector."""
+# Loop indices this far apart give the direction of a curve.
+_TANGENT_STEP = 0.02
+# A sector of which less is known is none, and fewer than this many say nothing.
+_LEAST_KNOWN = 0.7
+_FEWEST = 3
+# This share of a sector's energy is told by nothing: objects and light differ, and numbers are rounded.
+_UNTOLD = 0.03
+# What is fainter than this share of the plainest ring is none: that ring's objects reach there.
+_FAINT = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sectors:
+    """The waves of sectors, `waves` complex [N, K, M]: K samples (rows and features) of M waves for each of
+    N.
+
+    `energy` is what is typical of them before they were evened out.
+    """
+
+    waves: NDArray[np.complex64]
+    energy: float
+
+
+def recurrence_bits(
+    evidence: Evidence,
+    pattern: Pattern,
+    index: Tensor,
+    *,
+    focal_mm: float,
+    cells: bool,
+    theta: Tensor | None = None,
+) -> float:
+    """What the draws at `index` [N, 2] save by coming again at the program's steps, in bits, at least 0.
+
+    `cells`: the draws are rows of rows, all of which are alike, and must come again along i and along j: the
+    fewer bits count. Else each value of the loop variable that does not go along the curve has a ring, or
+    row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's.
+    """
+    theta = pattern.theta if theta is None else theta
+
+    def read(part: Tensor, along: int) -> Sectors:
+        return sectors_of(evidence, pattern, part, theta, focal_mm=focal_mm, along=along, cells=cells)
+
+    if cells:
+        return min(_bits(read(index, along).waves) for along in (0, 1))
+    along = 1 if pattern.turning is None else pattern.turning
+    ring = index[:, 1 - along]
+    rings = [read(index[ring == one], along) for one in ring.unique()]
+    plainest = max((one.energy for one in rings), default=0.0)
+    return sum(_bits(one.waves) for one in rings if one.energy >= _FAINT * plainest)
+
+
+def _bits(waves: NDArray[np.complex64]) -> float:
+    """The bits of sectors with a mean one: waves [N, K, M]; the lowest waves that say most are taken."""
+    number = len(waves)
+    if number < _FEWEST:
+        return 0.0
+    energy = (np.abs(waves) ** 2).sum((0, 1))  # [M]
+    mean = waves.mean(0)
+    shared = number * (np.abs(mean) ** 2).sum(0) / np.maximum(energy, 1e-12)
+    samples = _independent(waves - mean)
+    best = 0.0
+    for last in range(1, len(shared) + 1):
+        total = samples[:last].sum()
+        share = float((shared[:last] * samples[:last]).sum() / total) * (1 - _UNTOLD)
+        if share > 1 / number:
+            best = max(best, float(total) * likelihood_ratio(share, number))
+    # One of so many choices was made.
+    return max(0.0, best - math.log2(len(shared)))
+
+
+def likelihood_ratio(share: float, number: int) -> float:
+    """log2 of how much likelier a mean sector with this `share` of all energy is as an object than by chance.
+
+    That is for one complex sample of each of `number` sectors; `share` lies between 1/number and 1.
+    """
+    left = number - 1
+    nats = -number * math.log(number) - math.log(share) - left * math.log(1 - share) + left * math.log(left)
+    return nats / math.log(2)
+
+
+def _independent(rest: NDArray[np.complex64]) -> NDArray[np.float64]:
+    """How many independent samples each wave of sectors has, by what is not shared: [N, K, M] -> [M]."""
+    number = len(rest)
+    by_wave = np.moveaxis(rest, 2, 0)
+    gram = np.abs(by_wave @ np.conj(np.swapaxes(by_wave, 1, 2))) ** 2  # [M, N, N]
+    own = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+    alike = gram.sum((1, 2)) - np.diagonal(gram, axis1=1, axis2=2).sum(1)
+    every = own.sum(1) ** 2 - (own**2).sum(1)
+    # Residuals of a mean sum to nothing, so their cosines are 1/(number - 1) at least.
+    return np.minimum(every / np.maximum(alike, 1e-12), (number - 1) ** 2).clip(1.0)
+
+
+def sectors_of(
+    evidence: Evidence,
+    pattern: Pattern,
+    index: Tensor,
+    theta: Tensor,
+    *,
+    focal_mm: float,
+    along: int,
+    cells: bool,
+) -> Sectors:
+    """The sectors about the draws at `index` [N, 2], read along the loop variable `along`, 0 for i or 1 for
+    j.
+    """
+    # Half a step more at either end, for the mean over one step, and a sample for the gradients.
+    a = (np.arange(2 * ALONG + 2) + 0.5) / ALONG - 1 - 1 / ALONG
+    b = (np.arange(ACROSS + 2) - (ACROSS + 1) / 2) / ACROSS
+    points = _points(pattern, index, theta, a, b, along=along, cells=cells)
+    lab, known = _read(evidence, points, pattern, theta, focal_mm)
+    gx = 0.5 * (lab[..., 2:, :] - lab[..., :-2, :])[:, 1:-1]
+    gy = 0.5 * (lab[:, 2:] - lab[:, :-2])[..., 1:-1, :]
+    known = known[:, 1:-1, 1:-1].astype(np.float32)
+    whole = slice(ALONG // 2, ALONG // 2 + ALONG)
+    seen = known[..., whole]
+    gradients, colours = (
+        _without_mean(values, known)
+        for values in (np.stack(double_angle(gx, gy), 1), np.moveaxis(lab[:, 1:-1, 1:-1], -1, 1))
+    )
+    # [N, 6, ACROSS, ALONG], gradients and colours with the same weight.
+    values = np.concatenate([_evened(gradients, seen), _evened(colours, seen)], 1)
+    waves = np.fft.fft(values, axis=-1)[..., 1 : ALONG // 2].astype(np.complex64)
+    enough = seen.mean((1, 2)) >= _LEAST_KNOWN
+    typical = float(np.median(_energy(gradients, seen))) if len(index) else 0.0
+    return Sectors(waves.reshape(len(waves), -1, waves.shape[-1])[enough], typical)
+
+
+def _points(
+    pattern: Pattern, index: Tensor, theta: Tensor, a: NDArray, b: NDArray, *, along: int, cells: bool
+) -> Tensor:
+    """The plane points of sectors [N, B, A, 2]: `a` [A] steps along, `b` [B] steps across the draws."""
+    forth, up = torch.from_numpy(a), torch.from_numpy(b)
+    where = index[:, None, None, :].repeat(1, len(up) if cells else 1, len(forth), 1)
+    where[..., along] += forth
+    if cells:
+        where[..., 1 - along] += up[:, None]
+        return pattern.points_at(where.reshape(-1, 2), theta).reshape(*where.shape)
+    flat = where.reshape(-1, 2)
+    step = torch.zeros(2, dtype=torch.float64)
+    step[along] = _TANGENT_STEP
+    ahead, behind = (pattern.points_at(flat + sign * step, theta) for sign in (1, -1))
+    tangent = ((ahead - behind) / (2 * _TANGENT_STEP)).reshape(*where.shape)
+    length = tangent.norm(dim=-1, keepdim=True).clamp(min=1e-12)
+    across = torch.stack([-tangent[..., 1], tangent[..., 0]], -1) / length
+    width = length.median(2, keepdim=True).values  # a step of this draw
+    middle = pattern.points_at(flat, theta).reshape(*where.shape)
+    return middle + up[:, None, None] * width * across
+
+
+def _read(
+    evidence: Evidence, points: Tensor, pattern: Pattern, theta: Tensor, focal_mm: float
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """The colours [N, B, A, 3] at plane points [N, B, A, 2] and which are known [N, B, A]."""
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    row = points.shape[1] // 2
+    middle, front = project(matrix, points[:, row].reshape(-1, 2))
+    apart = (middle[1:] - middle[:-1]).norm(dim=1)[front[1:] & front[:-1]]
+    colours = evidence.colours_for(float(apart.median()) if len(apart) else 1.0)
+    at, in_front = project(colours.map_from_photo @ matrix, points.reshape(-1, 2))
+    at = at.float()
+    known = (sample_valid(colours.valid, at) & in_front).reshape(points.shape[:-1])
+    lab = sample(colours.values, at).reshape(*points.shape[:-1], 3)
+    return lab.numpy(), known.numpy()
+
+
+def _without_mean(values: Floats, known: Floats) -> Floats:
+    """Values [N, C, B, 2 * ALONG] less their mean over a step: [N, C, B, ALONG], the middle."""
+    weights = np.pad(known, ((0, 0), (0, 0), (1, 0))).cumsum(-1)[:, None]
+    sums = np.pad(values * known[:, None], ((0, 0), (0, 0), (0, 0), (1, 0))).cumsum(-1)
+    # The two samples at the ends of a step count by half.
+    weights, sums = ((table[..., 1:] + table[..., :-1]) / 2 for table in (weights, sums))
+    half = ALONG // 2
+    middle = slice(half, half + ALONG)
+    ahead, behind = slice(ALONG, 2 * ALONG), slice(0, ALONG)
+    mean = (sums[..., ahead] - sums[..., behind]) / np.maximum(
+        weights[..., ahead] - weights[..., behind], 1e-6
+    )
+    return ((values[..., middle] - mean) * known[:, None][..., middle]).astype(np.float32)
+
+
+def _energy(values: Floats, known: Floats) -> Floats:
+    """The mean energy of each sector: values [N, C, B, A], known [N, B, A] -> [N]."""
+    return ((values**2).sum((1, 2, 3)) / np.maximum(known.sum((1, 2)), 1)).astype(np.float32)
+
+
+def _evened(values: Floats, known: Floats) -> Floats:
+    """Values [N, C, B, A], each sector divided by the root of its energy and the typical one."""
+    energy = _energy(values, known)
+    typical = float(np.median(energy)) if len(energy) else 0.0
+    return (values / np.sqrt(energy + max(typical, 1e-9))[:, None, None, None]).astype(np.float32)
