@@ -3,11 +3,12 @@
 import numpy as np
 from torch import Tensor
 
+from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.answer import Answer
 from p3i.search.extent.layout import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.extent.primitive import primitive
-from p3i.search.fit.grow import Fit, follow, grow
+from p3i.search.fit.grow import Fit, follow, grow, measure, side_of_cell
 from p3i.search.forms.guess import Proposal
 from p3i.search.forms.lattice import Lattice, lattice_pattern, map_from_index
 from p3i.search.judge.elsewhere import with_note_of_others
@@ -146,6 +147,15 @@ def _finished(session: Session, pattern: Pattern, fit: Fit) -> Answer | None:
         own = _best_of(session, pattern, [(last.theta, last.index[last.support])])
         best = max((one for one in (best, own) if one is not None), key=lambda one: one.score, default=None)
     return best
+
+
+def finished_anew(session: Session, answer: Answer) -> Answer | None:
+    """A lattice finished once more from where it is, on other evidence: as far as it goes there."""
+    pattern, drawn = lattice_pattern(), compile(answer.program)
+    theta = Lattice.of(drawn, drawn.theta).theta(pattern)
+    level = session.evidence.level_for(side_of_cell(session.evidence, pattern, theta), finest=True)
+    fit = measure(level, pattern, theta, start=drawn.index.double())
+    return None if fit is None or not bool(fit.support.any()) else _finished(session, pattern, fit)
 
 
 def _best_of(session: Session, pattern: Pattern, readings: list[tuple[Tensor, Tensor]]) -> Answer | None:

@@ -17,10 +17,11 @@ from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_p
 from p3i.search.judge.bits import by_explained
 from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
+from p3i.search.lattices import finished_anew
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.optics.focal import with_own_focal
-from p3i.search.optics.lens import find_with_lens
+from p3i.search.optics.lens import through_lens, with_lens
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
 from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
 from p3i.search.result import (
@@ -74,7 +75,12 @@ def _searched(
     session = Session(Evidence(image, config, assumed[0]), config, progress, trace and _in_text(trace))
     width, height = image.size.width, image.size.height
     session.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
-    answers = _found(session) if config.lens is None else _found_with_lens(session)
+    if isinstance(config.lens, float | int):
+        answers = through_lens(session, config.lens, _found)
+    else:
+        answers = _found(session)
+        if config.lens == "auto" and asked_for(config) is None:
+            answers = with_lens(session, answers, finished_anew)
     return session.completed(lambda: _result(session, answers, assumed=assumed))
 
 
@@ -187,21 +193,6 @@ def _found(session: Session) -> list[Answer]:
     return session.completed(
         lambda: by_explained(session.evidence, answers, needed=needed_for(session.config))
     )
-
-
-def _found_with_lens(session: Session) -> list[Answer]:
-    """What is found through the lens of the options; once interrupted, what the photo as it is had shown."""
-    plain: list[Answer] = []
-
-    def search(inner: Session) -> list[Answer]:
-        found = _found(inner)
-        if inner is session:
-            plain[:] = found
-        return found
-
-    with session.until_interrupted():
-        return find_with_lens(session, search)
-    return plain
 
 
 def _in_text(trace: Trace) -> Trace:

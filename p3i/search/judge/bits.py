@@ -45,7 +45,7 @@ _UNPREDICTABLE = 0.05
 # look/contrast.py).
 _CHANCE = 0.1
 # A length or an angle is written in this many bits, a bound or a number of a guard in that many.
-_NUMBER_BITS = 11.0
+NUMBER_BITS = 11.0
 _WHOLE_BITS = 5.0
 # A loop, a guard, a circular coordinate: which of the productions.
 _PRODUCTION_BITS = 2.0
@@ -181,5 +181,5 @@ def cost_bits(program: Program) -> float:
             if name in shared:
                 continue
             shared.add(name)
-        bits += _NUMBER_BITS
+        bits += NUMBER_BITS
     return bits
