@@ -1,6 +1,6 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -15,23 +15,16 @@ from p3i.search.extent.phase import find_phase
 from p3i.search.extent.presence import find_extent
 from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
-from p3i.search.fit.robust import fit_instances
+from p3i.search.fit.settle import objects_of, settled
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
-from p3i.search.look.correlate import find_instances
 from p3i.search.look.evidence import Evidence, Level
-from p3i.search.look.thinned import thinned
 from p3i.vision.warp import in_frame
 
-# The last fit: on a map sharper by this, with so many samples along a cell's side, on at most so many objects
-# and at least so few, so many times.
-_SHARPER = 0.4
-_SIDE = 16
-_MOST_REFITTED = 300
+# Fewer objects are not fitted once more.
 _FEWEST_REFITTED = 6
-_REFITS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,28 +151,18 @@ def _drawn_cells(
 
 
 def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
-    """The layout with camera and lattice fitted once more, to its own objects only and on the fine map.
+    """The layout with camera and lattice fitted once more, to where its own objects lie.
 
-    What the fit grew on had cells cut anywhere and some beyond the pattern; now each cell holds an object.
+    What the fit grew on had cells cut anywhere and some beyond the pattern; now each place is an object's.
     Objects at the frame count too: they lie farthest apart, and that fixes the pose.
     """
-    theta = layout.lattice.theta(pattern)
-    side = side_of_middle(evidence, pattern, layout)
-    level = evidence.level_for(_SHARPER * side, finest=True)
-    index = _drawn_cells(level, pattern, layout, theta, cut=True)
-    if len(index) < _FEWEST_REFITTED:
+    objects = objects_of(evidence, layout.program(from_zero=False))
+    if objects is None or len(objects.index) < _FEWEST_REFITTED:
         return layout
-    index = index[thinned(index, _MOST_REFITTED)]
-    weights = torch.ones(len(index))
-    for _ in range(_REFITS):
-        found = find_instances(level, pattern, theta, index, weights, side=_SIDE)
-        weights = found.certainty
-        if int((weights > 0).sum()) < _FEWEST_REFITTED:
-            return layout
-        theta = fit_instances(level, pattern, theta, found, weights=weights.double())
-    if not sane(pattern, theta):
-        return layout
-    return Layout(Lattice.of(pattern, theta), layout.i_range, layout.j_range, layout.guards)
+    program = settled(objects).program()
+    drawn = compile(program)
+    theta = Lattice.of(drawn, drawn.theta).theta(pattern)
+    return replace(layout, lattice=Lattice.of(pattern, theta)) if sane(pattern, theta) else layout
 
 
 def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> float:

@@ -241,15 +241,15 @@ def settled(objects: Objects, *free: Free) -> Settled:
     )
 
 
-def saved_bits(less: Settled, more: Settled) -> float:
+def saved_bits(less: Settled, more: Settled, *, share: float) -> float:
     """How much shorter the places are told with the numbers that `more` has beside those of `less`.
 
-    Before these numbers are paid for. How far the places are independent, the fuller fit says: what the lens
-    moves alike is no noise once there is a lens. As many residuals as there are numbers are fitted by any.
+    Before these numbers are paid for. `share`: how many independent witnesses each object found is, by the
+    fullest fit (`Settled.share`), since what a lens moves alike is no noise once there is a lens. As many
+    residuals as there are numbers are fitted by any.
     """
-    objects = more.objects
-    spare = max(1 - len(more.numbers) / (2 * len(objects.index)), 0.0)
-    return spare * more.share * (less.length - more.length) / math.log(2)
+    spare = max(1 - len(more.numbers) / (2 * len(more.objects.index)), 0.0)
+    return spare * share * (less.length - more.length) / math.log(2)
 
 
 def _weighed(residual: Tensor, certainty: Tensor, variance: float) -> tuple[Tensor, float]:

@@ -26,6 +26,8 @@ from p3i.search.look.straight import Straightened, straightened
 # An answer is finished anew, and tells the lens anew by it, so many times at most.
 _ROUNDS = 3
 _K1_DIGITS = 4
+# What moves no object by a pixel is not worth a word.
+_LEAST_TOLD_PX = 1.0
 
 Search = Callable[[Session], list[Answer]]
 Finish = Callable[[Session, Answer], Answer | None]
@@ -35,13 +37,12 @@ Finish = Callable[[Session, Answer], Answer | None]
 class LensTold:
     """What the objects of an answer tell of a lens: the `fit` of all numbers with k1 among them.
 
-    `worth`: the bits that k1 is worth. `not_flat_px`: how far objects lie from where a plane that is flat
-    would have them, None where one explains them as well.
+    `worth`: the bits that k1 is worth. `crooked`: what else the objects tell, in words, or None.
     """
 
     fit: Settled
     worth: float
-    not_flat_px: float | None
+    crooked: str | None
 
     @property
     def k1(self) -> float:
@@ -60,17 +61,26 @@ def lens_told(objects: Objects, *, free_focal: bool = False) -> LensTold:
     focal = ("focal",) if free_focal else ()
     straight = dataclasses.replace(objects, k1=0.0)
     flat, lens = settled(straight, *focal), settled(objects, *focal, "lens")
-    worth = worth_of(saved_bits(flat, lens))
-    if worth <= 0 and flat.alike == 0:  # nothing is left that a bend could explain
-        return LensTold(lens, worth, None)
+    most = worth_of(saved_bits(flat, lens, share=objects.each))
+    if most <= 0 and flat.alike == 0:  # nothing is left that a bend could explain
+        return LensTold(lens, most, None)
     bent, both = settled(straight, *focal, "bend"), settled(objects, *focal, "bend", "lens")
-    worth = min(worth, worth_of(saved_bits(bent, both)))
-    bend = min(worth_of(saved_bits(one, other), numbers=3) for one, other in ((flat, bent), (lens, both)))
-    if bend <= 0:
-        return LensTold(lens, worth, None)
-    one, other = (lens, both) if worth > 0 else (flat, bent)
-    off = one.objects.seen(one.numbers, one.free) - other.objects.seen(other.numbers, other.free)
-    return LensTold(lens, worth, float(off.norm(dim=1).max()))
+
+    def worth(less: Settled, more: Settled, numbers: int) -> float:
+        return worth_of(saved_bits(less, more, share=both.share), numbers=numbers)
+
+    alone = worth(flat, lens, 1)
+    beside = min(alone, worth(bent, both, 1))
+    if min(worth(flat, bent, 3), worth(lens, both, 3)) > 0:
+        pair, words = ((lens, both) if beside > 0 else (flat, bent)), "not flat"
+    elif beside <= 0 < alone:
+        pair, words = (flat, lens), "seen through a lens, or not flat, which the objects do not tell"
+    else:
+        return LensTold(lens, beside, None)
+    one, other = (fit.objects.seen(fit.numbers, fit.free) for fit in pair)
+    off_px = float((one - other).norm(dim=1).max())
+    note = f"{words}: objects lie up to {off_px:.1f} pixels from where one plane would have them"
+    return LensTold(lens, beside, note if off_px >= _LEAST_TOLD_PX else None)
 
 
 def with_lens(session: Session, answers: list[Answer], finish: Finish) -> list[Answer]:
@@ -154,10 +164,8 @@ def _followed(session: Session, answer: Answer) -> Answer | None:
 
 
 def _noted(answer: Answer, told: LensTold) -> Answer:
-    if told.not_flat_px is None:
-        return answer
-    note = f"not flat: objects lie up to {told.not_flat_px:.1f} pixels from where one plane would have them"
-    return dataclasses.replace(answer, notes=(*answer.notes, note))
+    notes = () if told.crooked is None else (told.crooked,)
+    return dataclasses.replace(answer, notes=(*answer.notes, *notes))
 
 
 def _on_photo(seen: Straightened, answer: Answer) -> Answer:
