@@ -12,10 +12,11 @@ what stands off its plane has little to say. Neighbours that stray alike are no 
 lens, or a page that is not flat, makes many objects say no more than a few.
 
 Convention: N objects, V numbers: the free ones of the program (`forms/whole.py`), then those of the camera.
-Places are pixels of the photo as it was taken, which `Evidence.on_photo` knows.
+Places are pixels of the photo as it was taken.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -40,8 +41,8 @@ Free = Literal["focal", "lens", "bend"]
 
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 150
-_FEWEST = 4
-# Degrees of freedom of the noise.
+_FEWEST = 2
+# Degrees of freedom of the noise. Of its scale it says (4 + 2) / (4 + 4) of what a Gaussian would.
 _TAIL = 4.0
 # The scale of residuals, in units of `whitening`: where to begin, and the least that is believed.
 _VARIANCE, _LEAST_VARIANCE = 0.25, 1e-4
@@ -112,51 +113,74 @@ class Objects:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Settled:
-    """Numbers [V] fitted to the places of objects.
+class Fitted:
+    """Numbers [V] fitted to places, and what is left of the residuals.
 
-    `length` is the code length of the places in nats, but for what all fits share; `alike` how much of a
-    residual is its neighbour's; `covariance` [V, V] the numbers' own, of places that are independent.
+    `information` [V, V]: what the places say of the numbers, the inverse of a covariance, if they are
+    independent; as many residuals as there are numbers are fitted by any. `length` is their code length in
+    nats, but for what all fits share; `alike` how much of a residual is its neighbour's.
     """
 
-    objects: Objects
-    free: tuple[Free, ...]
     numbers: Tensor
+    information: Tensor
     length: float
     alike: float
-    covariance: Tensor
 
-    def number(self, name: Free) -> float:
-        """A number of the camera that was free, the first where it is several."""
-        before = self.free[: self.free.index(name)]
-        return float(self.numbers[len(self.objects.numbers) + sum(_NUMBERS[one] for one in before)])
+    def share(self, *, each: float, directions: int) -> float:
+        """How many independent witnesses an object is that stands for `each`, of a pattern in `directions`.
 
-    @property
-    def share(self) -> float:
-        """How many independent witnesses each object found is."""
-        # As in a chain of which each link remembers a share of the one before.
-        each, directions = self.objects.each, self.objects.directions
+        As in a chain of which each link remembers a share of the one before.
+        """
         alike = self.alike ** (each ** (-1 / directions))
         return each * ((1 - alike) / (1 + alike)) ** directions
 
+    def covariance(self, share: float, known: Tensor) -> Tensor:
+        """The numbers' covariance [V, V]; `known` [V] is what else is known of each, as 1 / variance."""
+        return _inverse(share * self.information + torch.diag(known))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """The numbers of a program and of a camera as the places of its objects tell them."""
+
+    objects: Objects
+    free: tuple[Free, ...]
+    fit: Fitted
+
+    @property
+    def share(self) -> float:
+        """How many independent witnesses each object found is (`Fitted.share`)."""
+        return self.fit.share(each=self.objects.each, directions=self.objects.directions)
+
+    def number(self, name: Free) -> float:
+        """A number of the camera that was free, the first where it is several."""
+        return float(self.fit.numbers[self._place(name)])
+
     def sigma(self, name: Free) -> float:
         """The standard deviation of that number."""
-        before = self.free[: self.free.index(name)]
-        place = len(self.objects.numbers) + sum(_NUMBERS[one] for one in before)
-        return math.sqrt(max(float(self.covariance[place, place]), 0.0) / self.share)
+        covariance = self.fit.covariance(self.share, torch.zeros(len(self.fit.numbers)))
+        return math.sqrt(max(float(covariance.diagonal()[self._place(name)]), 0.0))
 
     def program(self) -> Program:
         """The program with these numbers."""
-        return self.objects.filling.program(self.numbers[: len(self.objects.numbers)], ())
+        return self.objects.filling.program(self.fit.numbers[: len(self.objects.numbers)], ())
+
+    def places(self) -> Tensor:
+        """Where these numbers put the objects on the photo: [N, 2]."""
+        return self.objects.seen(self.fit.numbers, self.free)
+
+    def _place(self, name: Free) -> int:
+        before = self.free[: self.free.index(name)]
+        return len(self.objects.numbers) + sum(_NUMBERS[one] for one in before)
 
 
 def objects_of(
     evidence: Evidence, program: Program, *, focal_mm: float | None = None, seen: Straightened | None = None
 ) -> Objects | None:
-    """The objects of a program on a photo; None where fewer than four show.
+    """The objects of a program on a photo; None where fewer than two show.
 
     `focal_mm` is the program's own, None for the one that `evidence` assumes. `seen`: the straightened photo
-    that `evidence` is of, None where it is of the photo as it was taken.
+    that `evidence` is of, where its lens is in question; else places are of what `evidence` is of.
     """
     whole = whole_filling(program)
     if whole is None:
@@ -183,7 +207,7 @@ def objects_of(
         filling,
         numbers,
         index[there],
-        evidence.on_photo(places),
+        places if seen is None else seen.points_on_photo(places),
         whitening(matrix, where),
         certainty / certainty.mean(),
         shown / len(index),
@@ -197,47 +221,64 @@ def objects_of(
 
 
 def settled(objects: Objects, *free: Free) -> Settled:
-    """The program's numbers, and those of the camera that are `free`, fitted to the objects' places.
-
-    Gauss-Newton; the scale of the noise, and with it how much strays count, is fitted along.
-    """
+    """The program's numbers, and those of the camera that are `free`, fitted to the objects' places."""
     starts: dict[Free, float] = {"focal": math.log(objects.focal_mm), "lens": objects.k1, "bend": 0.0}
-    known: dict[Free, float] = {"focal": math.log(objects.expected_mm), "lens": 0.0, "bend": 0.0}
+    means: dict[Free, float] = {"focal": math.log(objects.expected_mm), "lens": 0.0, "bend": 0.0}
     theta = objects.filling.theta(objects.numbers)
-    count = len(objects.numbers)
     more: list[Free] = [one for one in free for _ in range(_NUMBERS[one])]
-    numbers = torch.cat([objects.numbers, torch.tensor([starts[one] for one in more]).double()])
-    limits = torch.tensor([*step_limits(objects.filling, theta), *(_LIMITS[one] for one in more)]).double()
-    mean = torch.cat([objects.numbers, torch.tensor([known[one] for one in more]).double()])
-    certain = torch.tensor([0.0] * count + [_SPREADS[one] ** -2 for one in more]).double()
-    variance = _VARIANCE
-    inverse = torch.zeros(len(numbers), len(numbers))
-    for _ in range(_MOST_STEPS):
-        points, slopes = with_slopes(lambda moving: objects.seen(moving, free), numbers, limits)
-        residual = torch.einsum("nij,nj->ni", objects.whiten, points - objects.places)
-        rows = torch.einsum("nij,njp->nip", objects.whiten, slopes)
-        weights, variance = _weighed(residual, objects.weights, variance)
-        weights = weights / variance
-        normal = torch.einsum("nip,n,niq->pq", rows, weights, rows) + torch.diag(certain * limits**2)
-        slope = torch.einsum("nip,n,ni->p", rows, weights, residual) + certain * (numbers - mean) * limits
-        inverse = torch.linalg.inv(normal + 1e-9 * torch.diag(normal.diagonal() + 1e-9))
-        step = -inverse @ slope
+    fit = fitted(
+        lambda moving: objects.seen(moving, free),
+        torch.cat([objects.numbers, torch.tensor([starts[one] for one in more]).double()]),
+        places=objects.places,
+        whiten=objects.whiten,
+        weights=objects.weights,
+        limits=torch.tensor([*step_limits(objects.filling, theta), *(_LIMITS[one] for one in more)]).double(),
+        mean=torch.cat([objects.numbers, torch.tensor([means[one] for one in more]).double()]),
+        known=torch.tensor([0.0] * len(objects.numbers) + [_SPREADS[one] ** -2 for one in more]).double(),
+    )
+    return Settled(objects, free, fit)
+
+
+def fitted(
+    points_of: Callable[[Tensor], Tensor],
+    start: Tensor,
+    *,
+    places: Tensor,
+    whiten: Tensor,
+    weights: Tensor,
+    limits: Tensor,
+    mean: Tensor,
+    known: Tensor,
+) -> Fitted:
+    """Numbers moved from `start` [V] until points fall on their places [N, 2].
+
+    Gauss-Newton; the scale of the noise, and with it how much strays count, is fitted along. `points_of`
+    takes numbers [..., V] to points [..., N, 2]; `whiten` [N, 2, 2] and `limits` [V] as in
+    `fit/robust.robust_fit`; `weights` [N] have the mean 1; `mean` and `known` [V] are what is known
+    beforehand, and as 1 / variance.
+    """
+    numbers, variance, steps = start, _VARIANCE, 0
+    while True:
+        points, slopes = with_slopes(points_of, numbers, limits)
+        residual = torch.einsum("nij,nj->ni", whiten, points - places)
+        rows = torch.einsum("nij,njp->nip", whiten, slopes) / limits
+        robust, variance = _weighed(residual, weights, variance)
+        information = torch.einsum("nip,n,niq->pq", rows, robust / variance, rows)
+        slope = torch.einsum("nip,n,ni->p", rows, robust / variance, residual) + known * (numbers - mean)
+        step = -_inverse(information + torch.diag(known)) @ slope / limits
         worst = float(step.abs().max())
-        if not math.isfinite(worst) or worst < _SETTLED:
+        if steps == _MOST_STEPS or not math.isfinite(worst) or worst < _SETTLED:
             break
         numbers = numbers + step * limits / max(1.0, worst)
-    residual = torch.einsum("nij,nj->ni", objects.whiten, objects.seen(numbers, free) - objects.places)
-    weights, variance = _weighed(residual, objects.weights, variance)
+        steps += 1
     squared = residual.square().sum(1)
     each = math.log(variance) + (_TAIL + 2) / 2 * (1 + squared / (_TAIL * variance)).log()
-    alike = _alike(objects.places, residual * weights.sqrt()[:, None])
-    return Settled(
-        objects,
-        free,
+    spare = max(1 - len(numbers) / (2 * len(places)), 0.0)
+    return Fitted(
         numbers,
-        float((objects.weights * each).sum()),
-        alike,
-        inverse * limits[:, None] * limits,
+        spare * (_TAIL + 2) / (_TAIL + 4) * information,
+        float((weights * each).sum()),
+        _alike(points, residual * robust.sqrt()[:, None]),
     )
 
 
@@ -245,11 +286,10 @@ def saved_bits(less: Settled, more: Settled, *, share: float) -> float:
     """How much shorter the places are told with the numbers that `more` has beside those of `less`.
 
     Before these numbers are paid for. `share`: how many independent witnesses each object found is, by the
-    fullest fit (`Settled.share`), since what a lens moves alike is no noise once there is a lens. As many
-    residuals as there are numbers are fitted by any.
+    fullest fit, since what a lens moves alike is no noise once there is a lens.
     """
-    spare = max(1 - len(more.numbers) / (2 * len(more.objects.index)), 0.0)
-    return spare * share * (less.length - more.length) / math.log(2)
+    spare = max(1 - len(more.fit.numbers) / (2 * len(more.objects.index)), 0.0)
+    return spare * share * (less.fit.length - more.fit.length) / math.log(2)
 
 
 def _weighed(residual: Tensor, certainty: Tensor, variance: float) -> tuple[Tensor, float]:
@@ -262,10 +302,17 @@ def _weighed(residual: Tensor, certainty: Tensor, variance: float) -> tuple[Tens
     return weights, variance
 
 
-def _alike(places: Tensor, left: Tensor) -> float:
+def _alike(points: Tensor, left: Tensor) -> float:
     """How much residuals `left` [N, 2] are those of their neighbours, 0 to _MOST_ALIKE."""
-    apart = torch.cdist(places, places).fill_diagonal_(torch.inf)
+    apart = torch.cdist(points, points).fill_diagonal_(torch.inf)
     shared = float((left * left[apart.argmin(1)]).sum() / left.square().sum().clamp(min=1e-12))
     # By chance they share 0, give or take the root of 1 / N; less than that is nothing.
-    chance = 1 / math.sqrt(len(places))
+    chance = 1 / math.sqrt(len(points))
     return 0.0 if shared <= chance else min(shared * (1 - (chance / shared) ** 2), _MOST_ALIKE)
+
+
+def _inverse(matrix: Tensor) -> Tensor:
+    """The inverse of a matrix of information, whose empty directions stay as good as unknown."""
+    scale = matrix.diagonal().clamp(min=1e-12).rsqrt()
+    even = matrix * scale[:, None] * scale + 1e-9 * torch.eye(len(matrix), dtype=matrix.dtype)
+    return torch.linalg.inv(even) * scale[:, None] * scale

@@ -31,7 +31,7 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern, without_doubles
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
-from p3i.search.judge.accept import beyond_noise
+from p3i.search.judge.accept import MOST_FALSE_ALARMS, beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import SIDE, frames, patch_contrast, sample_px, spacing
 from p3i.search.look.thinned import thinned
@@ -183,3 +183,8 @@ def cost_bits(program: Program) -> float:
             shared.add(name)
         bits += NUMBER_BITS
     return bits
+
+
+def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:
+    """What so many numbers are worth that save these bits: less their cost and what noise might save."""
+    return saved - numbers * NUMBER_BITS + math.log2(MOST_FALSE_ALARMS)

@@ -18,10 +18,10 @@ from p3i.search.config import MOST_K1
 from p3i.search.fit.places import follow, measured
 from p3i.search.fit.settle import Objects, Settled, objects_of, saved_bits, settled
 from p3i.search.forms.whole import scaled, whole_filling
-from p3i.search.judge.accept import MOST_FALSE_ALARMS
-from p3i.search.judge.bits import NUMBER_BITS, explained_bits
+from p3i.search.judge.bits import explained_bits, worth_of_numbers
 from p3i.search.look.session import Session
 from p3i.search.look.straight import Straightened, straightened
+from p3i.search.optics.tilt import tells_focal
 
 # An answer is finished anew, and tells the lens anew by it, so many times at most.
 _ROUNDS = 3
@@ -51,23 +51,18 @@ class LensTold:
         return round(max(-most, min(most, self.fit.number("lens"))), _K1_DIGITS)
 
 
-def worth_of(saved: float, *, numbers: int = 1) -> float:
-    """What so many numbers are worth that save these bits: less their cost and what noise might save."""
-    return saved - numbers * NUMBER_BITS + math.log2(MOST_FALSE_ALARMS)
-
-
 def lens_told(objects: Objects, *, free_focal: bool = False) -> LensTold:
     """Whether a lens pays for the places of the objects, or a plane that is bent, or both."""
     focal = ("focal",) if free_focal else ()
     straight = dataclasses.replace(objects, k1=0.0)
     flat, lens = settled(straight, *focal), settled(objects, *focal, "lens")
-    most = worth_of(saved_bits(flat, lens, share=objects.each))
-    if most <= 0 and flat.alike == 0:  # nothing is left that a bend could explain
+    most = worth_of_numbers(saved_bits(flat, lens, share=objects.each))
+    if most <= 0 and flat.fit.alike == 0:  # nothing is left that a bend could explain
         return LensTold(lens, most, None)
     bent, both = settled(straight, *focal, "bend"), settled(objects, *focal, "bend", "lens")
 
     def worth(less: Settled, more: Settled, numbers: int) -> float:
-        return worth_of(saved_bits(less, more, share=both.share), numbers=numbers)
+        return worth_of_numbers(saved_bits(less, more, share=both.share), numbers=numbers)
 
     alone = worth(flat, lens, 1)
     beside = min(alone, worth(bent, both, 1))
@@ -77,7 +72,7 @@ def lens_told(objects: Objects, *, free_focal: bool = False) -> LensTold:
         pair, words = (flat, lens), "seen through a lens, or not flat, which the objects do not tell"
     else:
         return LensTold(lens, beside, None)
-    one, other = (fit.objects.seen(fit.numbers, fit.free) for fit in pair)
+    one, other = (fit.places() for fit in pair)
     off_px = float((one - other).norm(dim=1).max())
     note = f"{words}: objects lie up to {off_px:.1f} pixels from where one plane would have them"
     return LensTold(lens, beside, note if off_px >= _LEAST_TOLD_PX else None)
@@ -143,11 +138,6 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
     sigma, count = told.fit.sigma("lens"), len(told.fit.objects.index)
     note = f"lens: k1 = {seen.k1:.3f} +- {sigma:.3f}, from {count} objects"
     return _noted(dataclasses.replace(_on_photo(seen, best), notes=(*answer.notes, note)), told)
-
-
-def tells_focal(answer: Answer) -> bool:
-    """Whether the places of an answer's objects tell its focal: a lattice's tell that of its cell only."""
-    return answer.focal_mm is not None and answer.structure != "lattice"
 
 
 def _followed(session: Session, answer: Answer) -> Answer | None:
