@@ -1,17 +1,16 @@
 """Rings on a photo: proposals, fits, where on the ring the objects sit, which are there, and the program."""
 
-import math
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.extent.sector import Place, Ring, places
 from p3i.search.fit.places import CurveFit, curve_score, follow, measured, numbers_of, values_of
 from p3i.search.forms.filling import Filling, filling_of
 from p3i.search.look.session import Session
+from p3i.search.optics.curve_focal import with_paid_focal
 from p3i.search.propose.votes import RingProposal, ring_proposals
 from p3i.search.result import StructureFound
 from p3i.search.table1 import ring_in_table1
@@ -22,11 +21,6 @@ _MOST_FINISHED = 2
 # So many radii are tried for the objects; a later one is taken where its contrast is this many times as high.
 _MOST_PLACES = 2
 _MUCH_BETTER = 4.0
-# A free focal must lower the logarithm of the misfit, times the objects, by this much, or the quality rise by
-# this factor; misfits are taken to lie between these.
-_FOCAL_PAYS = 6.0
-_MORE_QUALITY = 1.1
-_LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
 # Objects with less than this share of the plain ones' contrast are not there.
 _PRESENT = 0.4
 # A ring is closed where at most this share of it lacks in one piece.
@@ -142,30 +136,9 @@ def _followed(session: Session, fit: CurveFit, *, rounds: int) -> CurveFit:
     return follow(session.evidence, fit, rounds=3, free_focal=True)
 
 
-def _with_paid_focal(session: Session, fit: CurveFit) -> CurveFit:
-    """The fit with the focal that was assumed, where another one does not pay for itself.
-
-    One more number always fits a little better; whether it tells something shows an F-test on the misfit.
-    """
-    assumed = session.evidence.focal_mm
-    if fit.focal_mm == assumed:
-        return fit
-    values = values_of(fit)
-    camera = Camera(values["camera.rx"], values["camera.ry"], fit.focal_mm).refocused(assumed)
-    values |= {"camera.rx": camera.rx_deg, "camera.ry": camera.ry_deg}
-    start = measured(session.evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=assumed)
-    if start is None:
-        return fit
-    kept = follow(session.evidence, start, rounds=5)
-    misfits = [min(one.cost, _WORST_MISFIT) + _LEAST_MISFIT for one in (kept, fit)]
-    gain = len(fit.contrast) * math.log(misfits[0] / misfits[1])
-    paid = gain > _FOCAL_PAYS or fit.quality > _MORE_QUALITY * kept.quality
-    return fit if paid else kept
-
-
 def _finished(session: Session, fit: CurveFit) -> FoundRing:
     """The ring as far as it goes, its draws put where the objects sit."""
-    fit = _with_paid_focal(session, _extended(session, fit))
+    fit = with_paid_focal(session.evidence, _extended(session, fit))
     # Where most of the drawing repeats is where the objects are; how surely it repeats, any radius may tell.
     found, score = fit, curve_score(fit)
     for rank, place in enumerate(places(session.evidence, _ring_of(session, fit))[:_MOST_PLACES]):
