@@ -51,9 +51,10 @@ class SearchConfig:
     ] = None
     lens: Annotated[
         float | Literal["auto"] | None,
-        "Radial lens distortion k1 (below 0: barrel), or auto: estimated from the pattern. By default none.",
+        "Radial lens distortion k1 (below 0: barrel), none, or auto: told by the objects of the pattern that "
+        "was found, where it pays. A sketch, a start and the paper's recipe take the photo as it is.",
         Spelt(metavar="K1|auto|none", none="none"),
-    ] = None
+    ] = "auto"
     extent: Annotated[
         Extent | None,
         "Draw the objects that were found, or let a lattice fill the whole image, as in the paper. "
@@ -160,7 +161,7 @@ class SearchConfig:
                 raise UsageError(
                     f"--{how} is fitted under one focal: give its number, or leave out --focal auto"
                 )
-            if self.lens is not None:
+            if isinstance(self.lens, float | int):
                 raise UsageError(f"--{how} is fitted to the photo as it is: leave out --lens")
         if how == "recipe paper" and self.extent == "found":
             raise UsageError("--recipe paper fills the whole image: leave out --extent found")

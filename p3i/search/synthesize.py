@@ -9,6 +9,7 @@ import numpy as np
 
 from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
+from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.extent.drawn import drawn
@@ -16,17 +17,20 @@ from p3i.search.extent.layout import proposed, supported
 from p3i.search.fit.best import Best
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.fitting import certain, fit_places, holds, worth
+from p3i.search.fit.grow import measure, side_of_cell
 from p3i.search.fit.same import same_lattice, says_already
 from p3i.search.forms.asked import asks_for_itself, check_asked
 from p3i.search.forms.guess import Guess
+from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.sketches import Sketched, sketches
+from p3i.search.forms.spelled import lattice_filling
 from p3i.search.judge.answered import answers_of
 from p3i.search.judge.bits import by_explained
 from p3i.search.judge.elsewhere import with_note_of_others
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
-from p3i.search.optics.lens import find_with_lens
-from p3i.search.optics.paid_focal import with_paid_focal
+from p3i.search.optics.curve_focal import with_paid_focal
+from p3i.search.optics.lens import through_lens, with_lens
 from p3i.search.outcome import focal_of, outcome, told
 from p3i.search.propose.proposers import Proposer, proposers, share_of_time
 from p3i.search.result import NEEDED, STRUCTURES, StopReason, SynthesisResult
@@ -67,7 +71,12 @@ def synthesize(
         look = Session(Evidence(image, config, assumed[0]), config, progress, trace and _in_text(trace))
         width, height = image.size.width, image.size.height
         look.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
-        answers = _answers(look) if config.lens is None else _answers_with_lens(look)
+        if isinstance(config.lens, float | int):
+            answers = through_lens(look, config.lens, _answers)
+        else:
+            answers = _answers(look)
+            if config.lens == "auto" and not asks_for_itself(config):
+                answers = with_lens(look, answers, _finished_anew)
         return look.completed(lambda: outcome(look, answers, assumed=assumed))
 
 
@@ -108,7 +117,7 @@ def _take_up(look: Session, sketch: Sketched, proposer: Proposer, best: Best) ->
 def _drawn(look: Session, sketch: Sketched, guess: Guess, fit: Fit) -> Drawn | None:
     """What a fit draws, a ring with its own focal where that pays for itself."""
     ring = sketch.structure == "circular" and sketch.by_hand is None
-    return drawn(look, sketch, with_paid_focal(look, fit) if ring else fit, guess.base)
+    return drawn(look, sketch, with_paid_focal(look.evidence, fit) if ring else fit, guess.base)
 
 
 def _fitted(look: Session, guesses: Iterable[Guess], *, most: int) -> list[Fitted]:
@@ -188,19 +197,14 @@ def _finished(look: Session, fit: Fit) -> Answer | None:
     return None if found is None else Answer(found.program, "lattice", found.sure, worth(found.fit))
 
 
-def _answers_with_lens(look: Session) -> list[Answer]:
-    """What is found through the lens of the options; once interrupted, what the photo as it is had shown."""
-    plain: list[Answer] = []
-
-    def search(inner: Session) -> list[Answer]:
-        found = _answers(inner)
-        if inner is look:
-            plain[:] = found
-        return found
-
-    with look.until_interrupted():
-        return find_with_lens(look, search)
-    return plain
+def _finished_anew(look: Session, answer: Answer) -> Answer | None:
+    """A lattice finished once more from where it is, on other evidence: as far as it goes there."""
+    program = compile(answer.program)
+    pattern = lattice_filling().pattern
+    theta = Lattice.of(program, program.theta).theta(pattern)
+    level = look.evidence.level_for(side_of_cell(look.evidence, pattern, theta), finest=True)
+    fit = measure(level, pattern, theta, start=program.index.double())
+    return None if fit is None or not bool(fit.support.any()) else _finished(look, fit)
 
 
 def _in_text(trace: Trace) -> Trace:

@@ -1,6 +1,6 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -10,31 +10,23 @@ from torch import Tensor
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
-from p3i.interp.pattern import Pattern
 from p3i.search.extent.phase import find_phase
 from p3i.search.extent.presence import find_extent
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
-from p3i.search.fit.robust import fit_instances
+from p3i.search.fit.settle import objects_of, settled
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
-from p3i.search.look.correlate import find_instances
-from p3i.search.look.evidence import Evidence, Level
-from p3i.search.look.thinned import thinned
+from p3i.search.look.evidence import Evidence
 from p3i.vision.warp import in_frame
 
-# The last fit: on a map sharper by this, with so many samples along a cell's side, on at most so many objects
-# and at least so few, so many times.
-_SHARPER = 0.4
-_SIDE = 16
-_MOST_REFITTED = 300
+# Fewer objects are not fitted once more.
 _FEWEST_REFITTED = 6
-_REFITS = 3
 # A proposal is shown so many steps to each side.
 _SHOWN = (-6, 7)
 
@@ -171,44 +163,18 @@ def layout_fit(evidence: Evidence, layout: Layout) -> Fit | None:
     return weighed(best.level, drawn, drawn.theta, best.index, best.contrast)
 
 
-def _drawn_cells(
-    level: Level, pattern: Pattern, layout: Layout, theta: Tensor, *, cut: bool | None = None
-) -> Tensor:
-    """The cells in view that a layout draws, [N, 2]; `cut` as in `cells_in_view`."""
-    index = cells_in_view(level, pattern, theta, most=4000, cut=cut)
-    return index[torch.from_numpy(layout.holds(index.numpy()))]
-
-
 def refitted(evidence: Evidence, layout: Layout) -> Layout:
-    """The layout with camera and lattice fitted once more, to its own objects only and on the fine map.
+    """The layout with camera and lattice fitted once more, to where its own objects lie.
 
-    What the fit grew on had cells cut anywhere and some beyond the pattern; now each cell holds an object.
+    What the fit grew on had cells cut anywhere and some beyond the pattern; now each place is an object's.
     Objects at the frame count too: they lie farthest apart, and that fixes the pose.
     """
-    pattern = lattice_filling().pattern
-    theta = layout.lattice.theta(pattern)
-    side = side_of_middle(evidence, pattern, layout)
-    level = evidence.level_for(_SHARPER * side, finest=True)
-    index = _drawn_cells(level, pattern, layout, theta, cut=True)
-    if len(index) < _FEWEST_REFITTED:
+    objects = objects_of(evidence, layout.program(from_zero=False))
+    if objects is None or len(objects.index) < _FEWEST_REFITTED:
         return layout
-    index = index[thinned(index, _MOST_REFITTED)]
-    weights = torch.ones(len(index))
-    for _ in range(_REFITS):
-        found = find_instances(level, pattern, theta, index, weights, side=_SIDE)
-        weights = found.certainty
-        if int((weights > 0).sum()) < _FEWEST_REFITTED:
-            return layout
-        theta = fit_instances(level, pattern, theta, found, weights=weights.double())
-    if not sane(pattern, theta):
-        return layout
-    return Layout(Lattice.of(pattern, theta), layout.i_range, layout.j_range, layout.guards)
-
-
-def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> float:
-    """The side, in photo pixels, of the cell in the middle of a layout."""
-    middle = np.array([sum(layout.i_range) - 1, sum(layout.j_range) - 1]) / 2
-    return side_of_cell(evidence, pattern, layout.lattice.moved_to(middle).theta(pattern))
+    pattern, drawn = lattice_filling().pattern, compile(settled(objects).program())
+    theta = Lattice.of(drawn, drawn.theta).theta(pattern)
+    return replace(layout, lattice=Lattice.of(pattern, theta)) if sane(pattern, theta) else layout
 
 
 def _painted(evidence: Evidence, cells: Tensor, matrix: np.ndarray, lattice: Lattice) -> np.ndarray:

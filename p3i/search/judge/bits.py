@@ -26,12 +26,12 @@ from p3i.search.answer import Answer
 from p3i.search.fit.judged import sweeps_cells
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.recurrence import recurrence_bits
+from p3i.search.look.recurrence import MOST_FALSE_ALARMS, recurrence_bits
 from p3i.search.look.thinned import thinned
 
 # A length or an angle is written in this many bits: on the largest map, of 640 pixels, so many places lie 5
 # pixels apart, a quarter of the step of what can be seen. A bound or a number of a guard in that many.
-_NUMBER_BITS = 7.0
+NUMBER_BITS = 7.0
 _WHOLE_BITS = 5.0
 # A loop, a guard, a circular coordinate: which of the productions.
 _PRODUCTION_BITS = 2.0
@@ -106,5 +106,10 @@ def cost_bits(program: Program) -> float:
             if name in shared:
                 continue
             shared.add(name)
-        bits += _NUMBER_BITS
+        bits += NUMBER_BITS
     return bits
+
+
+def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:
+    """What so many numbers are worth that save these bits: less their cost and what noise might save."""
+    return saved - numbers * NUMBER_BITS + math.log2(MOST_FALSE_ALARMS)

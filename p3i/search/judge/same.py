@@ -9,6 +9,7 @@ from torch import Tensor
 
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
+from p3i.search.judge.region import photo_points
 from p3i.search.look.thinned import thinned
 from p3i.size import Size
 from p3i.vision.warp import in_frame
@@ -67,8 +68,8 @@ def _covered(places: Places, others: Places) -> float:
 def places_of(answer: Answer, *, size: Size, focal_mm: float) -> Places:
     """The objects of an answer on the photo, each once."""
     pattern = compile(answer.program)
-    points, in_front = pattern.centers_px(size=size, focal_mm=focal_mm)
-    seen = in_front & in_frame(points, size)
+    points, shown = photo_points(answer.program, pattern.centers(), size, focal_mm, lens_k1=answer.lens_k1)
+    seen = shown & in_frame(points, size)
     points, index = points[seen], pattern.index[seen]
     _, first = np.unique(np.round(points.numpy(), 3), axis=0, return_index=True)
     once = torch.from_numpy(np.sort(first))

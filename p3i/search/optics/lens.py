@@ -1,9 +1,11 @@
-"""Radial lens distortion, estimated from the pattern: k1 of p3i/interp/lens.py.
+"""Radial lens distortion: one more number of the last fit, where it pays for itself (p3i/interp/lens.py).
 
 A lens bends the rows of a lattice and makes an egg of a ring, which no camera pose can. So where the objects
-really lie, against where the program puts them, tells k1 together with all of the program's numbers. The
-search itself knows of pinhole cameras only: it looks at the photo straightened of its lens, on a canvas wide
-enough for all that the photo shows, and its programs are put back onto the photo's canvas.
+of a finished answer lie tells k1, together with all of the program's numbers (`fit/settle.py`). A page that
+is not flat bends rows as well; so the lens must pay beside a plane that is bent, too, and a bend that pays
+beside the lens is told of. The search itself knows of pinhole cameras only: what it found is finished once
+more on the photo straightened of its lens, on a canvas wide enough for all that the photo shows, and put back
+onto the photo's canvas.
 """
 
 import dataclasses
@@ -11,192 +13,159 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import torch
-
-from p3i.interp.camera import project
-from p3i.interp.lens import photo_from_straight
 from p3i.search.answer import Answer
 from p3i.search.config import MOST_K1
-from p3i.search.fit.features import step_limits
-from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
-from p3i.search.fit.robust import robust_fit
+from p3i.search.fit.places import follow, measured
+from p3i.search.fit.settle import Objects, Settled, objects_of, saved_bits, settled
 from p3i.search.forms.whole import scaled, whole_filling
-from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import Frames, find_objects, frames, spacing
+from p3i.search.judge.bits import explained_bits, worth_of_numbers
 from p3i.search.look.session import Session
-from p3i.search.look.straight import Straightened, shifted, straightened
-from p3i.search.look.thinned import thinned
-from p3i.vision.warp import in_frame
+from p3i.search.look.straight import Straightened, straightened
+from p3i.search.optics.tilt import tells_focal
 
-# An object's place is known to this share of the spacing, and no better than this many photo pixels.
-_SHARE_NOISE, _PIXEL_NOISE = 0.03, 0.3
-# k1 before anything is known: none, give or take this.
-_PRIOR_SPREAD = 0.2
-# A lens is believed in where k1 is so many times its own uncertainty, and not too small to matter.
-_SIGMAS, _LEAST_K1 = 4.0, 0.015
-# Two estimates this close are one.
-_CONVERGED = 0.01
-_MOST_OBJECTS = 300
-_FEWEST_OBJECTS = 12
+# An answer is finished anew, and tells the lens anew by it, so many times at most.
 _ROUNDS = 3
 _K1_DIGITS = 4
-# A fit that runs away ends within what the options take.
-_MOST = 0.95 * MOST_K1
+# What moves no object by a pixel is not worth a word.
+_LEAST_TOLD_PX = 1.0
 
 Search = Callable[[Session], list[Answer]]
+Finish = Callable[[Session, Answer], Answer | None]
 
 
-@dataclass(frozen=True, slots=True)
-class LensFit:
-    """k1 as the objects tell it, its standard deviation, and from how many objects."""
+@dataclass(frozen=True, slots=True, eq=False)
+class LensTold:
+    """What the objects of an answer tell of a lens: the `fit` of all numbers with k1 among them.
 
-    k1: float
-    spread: float
-    objects: int
+    `worth`: the bits that k1 is worth. `crooked`: what else the objects tell, in words, or None.
+    """
+
+    fit: Settled
+    worth: float
+    crooked: str | None
 
     @property
-    def certain(self) -> bool:
-        """Whether there is a lens worth correcting."""
-        return abs(self.k1) > max(_SIGMAS * self.spread, _LEAST_K1)
+    def k1(self) -> float:
+        """The lens, within what the options take."""
+        most = MOST_K1 - 10.0**-_K1_DIGITS
+        return round(max(-most, min(most, self.fit.number("lens"))), _K1_DIGITS)
 
 
-def estimated(evidence: Evidence, seen: Straightened, answer: Answer) -> LensFit | None:
-    """k1 from the objects of an answer that was found on `seen`; None where they are too few.
+def lens_told(objects: Objects, *, free_focal: bool = False) -> LensTold:
+    """Whether a lens pays for the places of the objects, or a plane that is bent, or both."""
+    focal = ("focal",) if free_focal else ()
+    straight = dataclasses.replace(objects, k1=0.0)
+    flat, lens = settled(straight, *focal), settled(objects, *focal, "lens")
+    most = worth_of_numbers(saved_bits(flat, lens, share=objects.each))
+    if most <= 0 and flat.fit.alike == 0:  # nothing is left that a bend could explain
+        return LensTold(lens, most, None)
+    bent, both = settled(straight, *focal, "bend"), settled(objects, *focal, "bend", "lens")
 
-    All numbers of the program, what it writes twice as one, and k1 are fitted together, to places on the
-    photo as it was taken.
+    def worth(less: Settled, more: Settled, numbers: int) -> float:
+        return worth_of_numbers(saved_bits(less, more, share=both.share), numbers=numbers)
+
+    alone = worth(flat, lens, 1)
+    beside = min(alone, worth(bent, both, 1))
+    if min(worth(flat, bent, 3), worth(lens, both, 3)) > 0:
+        pair, words = ((lens, both) if beside > 0 else (flat, bent)), "not flat"
+    elif beside <= 0 < alone:
+        pair, words = (flat, lens), "seen through a lens, or not flat, which the objects do not tell"
+    else:
+        return LensTold(lens, beside, None)
+    one, other = (fit.places() for fit in pair)
+    off_px = float((one - other).norm(dim=1).max())
+    note = f"{words}: objects lie up to {off_px:.1f} pixels from where one plane would have them"
+    return LensTold(lens, beside, note if off_px >= _LEAST_TOLD_PX else None)
+
+
+def with_lens(session: Session, answers: list[Answer], finish: Finish) -> list[Answer]:
+    """The answers, the best of them finished under the lens that its objects tell, if they tell one.
+
+    `finish` works out a lattice from where it is; it is given a session and an answer on the straightened
+    photo. What is not flat is told of in a note. A search that was cut short looks for no lens.
     """
-    whole = whole_filling(answer.program)
-    if whole is None:
-        return None
-    filling, numbers = whole
-    pattern, theta = filling.pattern, filling.theta(numbers)
-    focal_mm = answer.focal_mm or evidence.focal_mm
-    canvas = evidence.image.size
-    index = pattern.index.double()
-    matrix = pattern.image_from_plane(theta, size=canvas, focal_mm=focal_mm)
-    points, in_front = project(matrix, pattern.points_at(index, theta))
-    index = index[in_front & in_frame(points, canvas)]
-    index = index[thinned(index, _MOST_OBJECTS)]
-    if len(index) < _FEWEST_OBJECTS:
-        return None
-    side = spacing(pattern, theta)
-    found = find_objects(
-        evidence, pattern, theta, index, torch.ones(len(index)), side=side, focal_mm=focal_mm
-    )
-    # Once more, with a mean of the objects that were seen.
-    found = find_objects(evidence, pattern, theta, index, found.certainty, side=side, focal_mm=focal_mm)
-    weights = found.certainty
-    if int((weights > 0).sum()) < _FEWEST_OBJECTS:
-        return None
-    index, offsets, weights = index[weights > 0], found.offsets[weights > 0], weights[weights > 0].double()
-    plane = frames(pattern, theta, index, side=side).points(offsets[:, None])[:, 0]
-    straight, _ = project(matrix, plane)
-    targets = seen.points_on_photo(straight)
-    cell_px = _spacing_px(frames(pattern, theta, index, side=side), matrix)
-    noise = (_PIXEL_NOISE**2 + (_SHARE_NOISE * cell_px) ** 2).sqrt()
-    # Where the pattern was to tell the focal, an egg may have been taken for a circle under a wrong one.
-    free_focal = answer.focal_mm is not None
-    steps = [*step_limits(filling, theta), *([MOST_ZOOM] if free_focal else []), 0.05]
-
-    def points_of(moving: torch.Tensor) -> torch.Tensor:
-        theta = filling.theta(moving[..., : len(numbers)])
-        at = pattern.image_from_plane(
-            theta, size=canvas, focal_mm=moving[..., -2].exp() if free_focal else focal_mm
-        )
-        straight, _ = project(at, pattern.points_at(index, theta))
-        return photo_from_straight(
-            shifted(straight, canvas, seen.photo_size), moving[..., -1, None, None], size=seen.photo_size
-        )[0]
-
-    more = [math.log(focal_mm), seen.k1] if free_focal else [seen.k1]
-    start = torch.cat([numbers, torch.tensor(more, dtype=torch.float64)])
-    prior = torch.zeros(len(start), 2, dtype=torch.float64)
-    if free_focal:
-        prior[-2, 0], prior[-2, 1] = math.log(evidence.focal_mm), 1 / FOCAL_SPREAD**2
-    prior[-1, 1] = 1 / _PRIOR_SPREAD**2
-    whiten = torch.eye(2, dtype=torch.float64) / noise[:, None, None]
-    moved = robust_fit(
-        points_of,
-        start,
-        targets=targets,
-        whiten=whiten,
-        weights=weights,
-        limits=torch.tensor(steps, dtype=torch.float64),
-        prior=prior,
-        iterations=15,
-    )
-    return LensFit(float(moved[-1]), _spread(points_of, moved, targets, noise), len(index))
+    if not answers or session.stopped is not None:
+        return answers
+    with session.until_interrupted():
+        return [_with_lens(session, answers[0], finish), *answers[1:]]
+    return answers
 
 
-def find_with_lens(session: Session, search: Search) -> list[Answer]:
-    """What `search` finds on the photo freed of its lens, in units of the photo's canvas, the best first.
+def through_lens(session: Session, k1: float, search: Search) -> list[Answer]:
+    """What `search` finds on the photo freed of a lens that is known, on the photo's canvas."""
+    with session.until_interrupted():
+        seen = straightened(session.evidence.image, k1)
+        again = dataclasses.replace(session, evidence=seen.looked_at(session.evidence))
+        found = search(again)
+        session.stopped = again.stopped
+        return [_on_photo(seen, answer) for answer in found]
+    return []
 
-    A lens that the options state is taken as it is. One that is to be estimated is, from the first answer on
-    the photo as it is; then the photo is straightened and searched again until k1 stays. That is kept only
-    where the score has gained, and where no lens shows the answers are those on the photo as it is.
-    """
-    given = session.config.lens
-    image = session.evidence.image
-    if isinstance(given, float | int):
-        seen = straightened(image, given)
-        return [_on_photo(seen, answer) for answer in _searched(seen, session, search)[0]]
-    plain = found = best = search(session)
-    seen, evidence = straightened(image, 0.0), session.evidence
+
+def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
+    evidence, free_focal = session.evidence, tells_focal(answer)
+    objects = objects_of(evidence, answer.program, focal_mm=answer.focal_mm)
+    if objects is None:
+        return answer
+    told = lens_told(objects, free_focal=free_focal)
+    if told.worth <= 0:
+        return _noted(answer, told)
+    before = explained_bits(evidence, answer)
+    best, seen = answer, straightened(evidence.image, 0.0)
     for _ in range(_ROUNDS):
-        if not found or not session.go_on():
+        fit, now = told.fit, told.k1
+        session.tell("straightening the photo of its lens", 0.97)
+        session.record("lens", k1=now, spread=fit.sigma("lens"), objects=len(fit.objects.index))
+        focal_mm = math.exp(fit.number("focal")) if free_focal else answer.focal_mm
+        start = _on_photo(seen, dataclasses.replace(best, program=fit.program(), focal_mm=focal_mm))
+        seen = straightened(evidence.image, now)
+        again = dataclasses.replace(session, evidence=seen.looked_at(evidence))
+        start = _on_canvas(seen, start)
+        found = finish(again, start) if answer.structure == "lattice" else _followed(again, start)
+        session.stopped = again.stopped
+        if found is None:
+            return answer
+        worth = answer.worth + explained_bits(again.evidence, found) - before + told.worth
+        best = dataclasses.replace(found, worth=worth, notes=answer.notes)
+        objects = objects_of(again.evidence, best.program, focal_mm=best.focal_mm, seen=seen)
+        if objects is None:
+            return answer
+        told = lens_told(objects, free_focal=free_focal)
+        if abs(told.k1 - now) <= told.fit.sigma("lens") or session.stopped is not None:
             break
-        session.tell("estimating the lens", 0.9)
-        told = estimated(evidence, seen, found[0])
-        if told is None or abs(told.k1 - seen.k1) < _CONVERGED or (best is plain and not told.certain):
-            break
-        session.record("lens", k1=told.k1, spread=told.spread, objects=told.objects)
-        seen = straightened(image, round(max(-_MOST, min(_MOST, told.k1)), _K1_DIGITS))
-        found, evidence = _searched(seen, session, search)
-        if not found or (best and found[0].score < best[0].score):
-            break
-        note = f"lens: k1 = {seen.k1:.3f} +- {told.spread:.3f}, from {told.objects} objects"
-        best = [dataclasses.replace(_on_photo(seen, one), notes=(*one.notes, note)) for one in found]
-    return best
+    if best.worth < answer.worth or told.worth <= 0:
+        return answer
+    sigma, count = told.fit.sigma("lens"), len(told.fit.objects.index)
+    note = f"lens: k1 = {seen.k1:.3f} +- {sigma:.3f}, from {count} objects"
+    return _noted(dataclasses.replace(_on_photo(seen, best), notes=(*answer.notes, note)), told)
+
+
+def _followed(session: Session, answer: Answer) -> Answer | None:
+    """A ring or hybrid on a straightened photo, fitted from where it is."""
+    whole = whole_filling(answer.program)
+    assert whole is not None
+    focal_mm = answer.focal_mm or session.evidence.focal_mm
+    start = measured(session.evidence, *whole, focal_mm=focal_mm)
+    if start is None:
+        return None
+    fit = follow(session.evidence, start, rounds=3, free_focal=tells_focal(answer))
+    focal_mm = fit.focal_mm if answer.focal_mm is not None else None
+    return dataclasses.replace(answer, program=fit.filling.program(fit.z, ()), focal_mm=focal_mm)
+
+
+def _noted(answer: Answer, told: LensTold) -> Answer:
+    notes = () if told.crooked is None else (told.crooked,)
+    return dataclasses.replace(answer, notes=(*answer.notes, *notes))
 
 
 def _on_photo(seen: Straightened, answer: Answer) -> Answer:
-    """An answer found on the straightened photo, in units of the photo's canvas, with its k1."""
+    """An answer on the straightened photo, in units of the photo's canvas, with its k1."""
     focal_mm = None if answer.focal_mm is None else answer.focal_mm * seen.scale
     program = scaled(answer.program, seen.scale)
     return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=seen.k1)
 
 
-def _searched(seen: Straightened, session: Session, search: Search) -> tuple[list[Answer], Evidence]:
-    """The answers on a straightened photo, in units of its own canvas, and what was looked at."""
-    evidence = seen.looked_at(session.evidence)
-    again = dataclasses.replace(session, evidence=evidence)
-    found = search(again)
-    session.stopped = again.stopped
-    return found, evidence
-
-
-def _spacing_px(where: Frames, matrix: torch.Tensor) -> torch.Tensor:
-    """The spacing about each object in pixels [N]: the root of the area that its patch covers."""
-    corners = [project(matrix, where.origin + 0.1 * axis)[0] for axis in (where.along, where.across)]
-    middle, _ = project(matrix, where.origin)
-    a, b = ((corner - middle) / 0.1 for corner in corners)
-    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).abs().sqrt()
-
-
-def _spread(
-    points_of: Callable[[torch.Tensor], torch.Tensor],
-    numbers: torch.Tensor,
-    targets: torch.Tensor,
-    noise: torch.Tensor,
-) -> float:
-    """The standard deviation of the last of the fitted numbers, by what is left of the residuals."""
-    jacobian = torch.func.jacfwd(points_of)(numbers) / noise[:, None, None]
-    left = ((points_of(numbers) - targets) / noise[:, None]).square().sum(1)
-    rows = jacobian.reshape(-1, len(numbers))
-    scale = rows.norm(dim=0).clamp(min=1e-9)
-    normal = (rows / scale).T @ (rows / scale)
-    inverse = torch.linalg.pinv(normal + 1e-9 * torch.eye(len(numbers), dtype=rows.dtype))
-    # Half the median of a chi-square of two degrees is ln 2: strays do not widen the spread.
-    variance = float(left.median()) / (2 * math.log(2))
-    return math.sqrt(max(float(inverse[-1, -1]), 0.0) * variance) / float(scale[-1])
+def _on_canvas(seen: Straightened, answer: Answer) -> Answer:
+    """An answer in units of the photo's canvas in those of the straightened one."""
+    focal_mm = None if answer.focal_mm is None else answer.focal_mm / seen.scale
+    return dataclasses.replace(answer, program=scaled(answer.program, 1 / seen.scale), focal_mm=focal_mm)

@@ -16,6 +16,7 @@ from p3i.interp.camera import Camera, project
 from p3i.interp.lens import straight_from_photo
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
+from p3i.search.fit.settle import fitted
 from p3i.search.look.evidence import Evidence
 from p3i.search.optics.tilt import covariance_of, doubt_note, pose_sigma_deg, sigma_of_normal_deg
 from p3i.search.result import StructureFound
@@ -125,18 +126,20 @@ def test_the_angle_of_the_normal_has_the_variance_that_its_slopes_give_it() -> N
 def _row(noise: Tensor, **changes: float) -> float:
     """The standard deviation of the place of a row of 400 points, which strayed by `noise` [400, 2]."""
     places = torch.stack([torch.arange(400.0), torch.zeros(400)], 1).double()
-    covariance = covariance_of(
+    start = torch.zeros(2, dtype=torch.float64)
+    fit = fitted(
         lambda moved: places + moved[..., None, :],
-        torch.zeros(2, dtype=torch.float64),
-        limits=torch.ones(2, dtype=torch.float64),
-        targets=places + noise,
+        start,
+        places=places + noise,
         whiten=torch.eye(2, dtype=torch.float64).expand(400, 2, 2),
         weights=torch.ones(400, dtype=torch.float64),
-        known=torch.full((2,), changes.get("known", 0.0), dtype=torch.float64),
-        each=changes.get("each", 1.0),
-        directions=1,
+        limits=torch.ones(2, dtype=torch.float64),
+        mean=start,
+        known=start,
     )
-    return float(covariance[0, 0].sqrt())
+    known = torch.full((2,), changes.get("known", 0.0), dtype=torch.float64)
+    share = fit.share(each=changes.get("each", 1.0), directions=1)
+    return float(covariance_of(fit, start, known=known, share=share)[0, 0].sqrt())
 
 
 def noise(scale: float = 2.0) -> Tensor:
