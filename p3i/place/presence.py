@@ -11,8 +11,10 @@ Convention: pixels of the photo, pixel centres at whole numbers; `index` [K, 2] 
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.grammar.ast import Program
+from p3i.place.flat import flat_of
 from p3i.place.outlines import Chart, chart_of
-from p3i.place.placed import Placed
+from p3i.place.placed import Placed, placed
 from p3i.vision.alike import alike_in
 from p3i.vision.cell_bits import TOWARDS, CellBits, cell_bits
 from p3i.vision.cells import cut
@@ -23,6 +25,9 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
+THERE = 0.5
+"""An object whose presence is at least this is there: its bits speak for it."""
+
 _SIDES = (8, 24)
 """Samples along the side of a cell: at least, at most."""
 _SAMPLES = 3_000_000
@@ -31,16 +36,28 @@ _FEWEST = 3
 """With fewer objects than this there is no telling what is common to them."""
 
 
-def presence_of(placed: Placed, photo: Image, index: np.ndarray) -> Array:
+def absent_of(program: Program, photo: Image, *, focal_mm: float | None = None) -> tuple[int, int]:
+    """How many objects of `program` the photo does not show where they are drawn, and of how many in it.
+
+    Objects that cannot be judged are not among the first. `focal_mm` counts where the program's header names
+    none.
+    """
+    inside = placed(program, photo, focal_mm=focal_mm).in_sight()
+    flat = flat_of(photo, program, focal_mm=focal_mm)
+    scores = presence_of(flat.placed, flat.photo, flat.placed.index[inside])
+    return int((scores < THERE).sum()), int(inside.sum())
+
+
+def presence_of(laid: Placed, photo: Image, index: np.ndarray) -> Array:
     """How probably the photo shows each object of `index` [K, 2]: [K] in 0..1, nan where it cannot be judged.
 
-    `photo` is flat, as `placed` is (flat.py).
+    `photo` is flat, as `laid` is (flat.py).
     """
     unknown = np.full(len(index), np.nan)
-    chart = chart_of(placed.pattern)
+    chart = chart_of(laid.pattern)
     if len(index) < _FEWEST or not chart.directions:
         return unknown
-    sheet = sheet_of(placed, photo, chart, index)
+    sheet = sheet_of(laid, photo, chart, index)
     if sheet is None:
         return unknown
     place = _position(chart, sheet.box, index)
@@ -72,13 +89,13 @@ def _by_halves(found: CellBits, drawn: Floats) -> Array:
     return np.where(np.stack(facing), found.halves, -np.inf).max(axis=0)
 
 
-def sheet_of(placed: Placed, photo: Image, chart: Chart, index: np.ndarray) -> Sheet | None:
+def sheet_of(laid: Placed, photo: Image, chart: Chart, index: np.ndarray) -> Sheet | None:
     """The cells at `index` [N, 2], those between and around too, side by side; None for too many."""
     box = _box(chart, index)
     side = int(np.clip(np.sqrt(_SAMPLES / box.count) // 2 * 2, 0, _SIDES[1]))
     if side < _SIDES[0]:
         return None
-    pixels, valid, matrix = _reduced(placed, photo, chart, index, side)
+    pixels, valid, matrix = _reduced(laid, photo, chart, index, side)
     at, front = _seen_at(chart, matrix, sheet_points(box, side))
     steps = [np.linalg.norm(np.gradient(at, axis=axis), axis=-1) for axis in (0, 1)]
     spacing = np.where(front, np.maximum(*steps), 1.0)
@@ -111,7 +128,7 @@ def _seen_at(chart: Chart, matrix: Array, points: Array) -> tuple[Array, Mask]:
 
 
 def _reduced(
-    placed: Placed, photo: Image, chart: Chart, index: np.ndarray, side: int
+    laid: Placed, photo: Image, chart: Chart, index: np.ndarray, side: int
 ) -> tuple[Floats, Mask, Array]:
     """The photo no larger than the sheet can use, and the matrix from the plane to its pixels."""
     place = np.zeros((len(index), 4))
@@ -121,7 +138,7 @@ def _reduced(
         move = np.zeros(4)
         move[axis] = 0.25
         (before, front), (after, ahead) = (
-            project(placed.image_from_plane, chart.at(place + sign * move)) for sign in (-1, 1)
+            project(laid.image_from_plane, chart.at(place + sign * move)) for sign in (-1, 1)
         )
         ends.append(np.where(front & ahead, np.linalg.norm(after - before, axis=1) * 2, np.nan))
     # The largest cells decide: the smaller ones keep what they have.
@@ -131,4 +148,4 @@ def _reduced(
     scale = photo.size.longer / small.size.longer
     shift = (1 / scale - 1) / 2
     small_from_photo = np.array([[1 / scale, 0, shift], [0, 1 / scale, shift], [0, 0, 1.0]])
-    return small.pixels, small.valid, small_from_photo @ placed.image_from_plane
+    return small.pixels, small.valid, small_from_photo @ laid.image_from_plane
