@@ -30,6 +30,9 @@ Polygon = tuple[tuple[float, float], ...]
 Progress = Callable[[str, float], None]
 Trace = Callable[[Mapping[str, Any]], None]
 
+_MANY_ABSENT = 1 / 3
+"""Where more than this share of the objects is not there, the result says so."""
+
 
 @refuses_unknown
 def read_image(path: str | os.PathLike[str], *, max_px: int | None = None) -> "Image":
@@ -73,11 +76,12 @@ def synth(
     from p3i.search.synthesize import synthesize
 
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
-    result = synthesize(without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
+    seen = without(image, mask=mask, roi=roi)
+    result = synthesize(seen, config, progress=progress, trace=trace)
     name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
     heard = tuple(note for note in image.notes if note not in result.notes)
     result = dataclasses.replace(result, notes=heard + result.notes)
-    return _with_headers(result, size=image.size, name=name)
+    return _with_absent(_with_headers(result, size=image.size, name=name), seen)
 
 
 def score(
@@ -240,6 +244,19 @@ def _relative(photo: str | os.PathLike[str], folder: Path) -> str | None:
     except OSError:  # the working folder is gone
         return None
     return name if name.isprintable() else None
+
+
+def _with_absent(result: SynthesisResult, photo: "Image") -> SynthesisResult:
+    """`result` with the number of its objects that `photo` does not show, and a note where they are many."""
+    if result.program is None:
+        return result
+    from p3i.place.presence import absent_of
+
+    absent, count = absent_of(result.program, photo, focal_mm=result.focal_mm)
+    notes = result.notes
+    if absent > _MANY_ABSENT * count:
+        notes = (*notes, f"{absent} of {count} objects are not there on the photo; p3i show marks them")
+    return dataclasses.replace(result, absent=absent, notes=notes)
 
 
 def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) -> SynthesisResult:

@@ -19,13 +19,10 @@ from p3i.place.flat import Flat, flat_of
 from p3i.place.lens import bent_points
 from p3i.place.naming import Arrangement, Naming, named
 from p3i.place.placed import Placed, placed
-from p3i.place.presence import presence_of
+from p3i.place.presence import THERE, presence_of
 from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image
-
-THERE = 0.5
-"""An object whose presence is at least this counts as there."""
 
 Polygon = tuple[tuple[float, float], ...]
 

@@ -88,6 +88,7 @@ class SynthesisResult:
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
     why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at
     most `SearchConfig.top`.
+    `absent` is how many of them the photo does not show, as `p3i points` tells; None without a program.
     `lens_k1` is the radial distortion of the photo that `program` holds on (docs/geometry.md), None where it
     was seen as a pinhole camera's; `centers` lie on the photo as it is. `region` is the part of the photo
     where the program holds: a convex polygon around the cells of its objects, (x, y) in pixels.
@@ -110,6 +111,7 @@ class SynthesisResult:
     focal_mm: float = 35.0
     focal_source: FocalSource = "default"
     focal_reason: str = ""
+    absent: int | None = None
     lens_k1: float | None = None
     region: tuple[tuple[float, float], ...] = ()
     features: str = ""
@@ -166,6 +168,7 @@ class SynthesisResult:
             "score": _rounded(self.score),
             "margin": _rounded(self.margin),
             "false_alarms": self.false_alarms,
+            "absent": self.absent,
             "seconds": None if seconds is None else round(seconds, 3),
             "features": self.features,
             "seed": self.seed,

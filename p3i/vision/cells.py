@@ -126,5 +126,10 @@ def agreement(cells: Floats, seen: Mask, templates: Floats) -> Floats:
     product = flat @ templates.reshape(kinds, -1).T
     energy = (flat * flat).sum(axis=1)[:, None]
     expected = known @ (templates**2).sum(axis=1).reshape(kinds, -1).T
+    return correlation(product, energy, expected)
+
+
+def correlation(product: Floats, energy: Floats, expected: Floats) -> Floats:
+    """Correlations [...] from products and energies; a flat cell's counts as part of `expected`."""
     scale = np.sqrt(np.maximum(energy, _FLAT**2 * expected) * expected)
-    return product / np.maximum(scale, 1e-6)
+    return (product / np.maximum(scale, 1e-6)).astype(np.float32)

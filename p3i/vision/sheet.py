@@ -43,6 +43,12 @@ class Box:
     def count(self) -> int:
         return self.rows * self.columns
 
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """(i, j) of each cell [N, 2], row by row."""
+        i, j = np.meshgrid(np.arange(self.i_start, self.i_stop), np.arange(self.j_start, self.j_stop))
+        return np.stack([i.ravel(), j.ravel()], axis=-1)
+
 
 @dataclass(frozen=True, slots=True)
 class Sheet:

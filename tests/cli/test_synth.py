@@ -88,6 +88,8 @@ def search(monkeypatch: pytest.MonkeyPatch) -> Search:
     module = types.ModuleType("p3i.search.synthesize")
     module.synthesize = stand_in.synthesize  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "p3i.search.synthesize", module)
+    # The photos are of one grey level: no object of what is answered is there.
+    monkeypatch.setattr("p3i.place.presence.absent_of", lambda *_, **__: (0, 20))
     return stand_in
 
 
@@ -123,7 +125,7 @@ def test_jsonl_has_the_documented_keys_in_order(photo, capsys) -> None:
     record = json.loads(capsys.readouterr().out)
     assert list(record) == [
         "image", "width", "height", "program", "structure", "camera", "centers",
-        "region", "score", "margin", "false_alarms", "seconds", "features", "seed",
+        "region", "score", "margin", "false_alarms", "absent", "seconds", "features", "seed",
     ]  # fmt: skip
     assert (record["image"], record["width"], record["height"]) == ("a.png", 64, 48)
     assert record["camera"] == {

@@ -9,6 +9,7 @@ import pytest
 from p3i import loads
 from p3i.interp.camera import Camera
 from p3i.place.objects import Objects, objects_of
+from p3i.place.presence import absent_of
 from p3i.size import Size
 from p3i.vision.image import Image
 
@@ -82,6 +83,61 @@ def test_a_covered_object_is_not_there() -> None:
     cv2.circle(pixels, at, 22, (0.9, 0.2, 0.1), -1, cv2.LINE_AA)
     found = objects_of(loads(LATTICE), dataclasses.replace(covered, pixels=pixels))
     assert absent(found) == {"D5"}
+
+
+def ruled(*, count: int = 12, light: float = 0.0) -> tuple[str, Image]:
+    """A sheet of count x count ruled fields on a table, in sight from above, and its crossings as a program.
+
+    `light` is how much darker it is at the right end than at the left.
+    """
+    step, table = 3.0, np.full((480 * _FINE, 640 * _FINE, 3), (70, 100, 120), np.uint8)
+
+    def at(*points: tuple[float, float]) -> np.ndarray:
+        pixels = (np.array(points) * 6.4 + (320, 240)) * _FINE
+        return np.round(pixels * 16).astype(np.int32)
+
+    end = step * count / 2
+    rim = end + 0.4 * step
+    cv2.fillPoly(table, [at((-rim, -rim), (rim, -rim), (rim, rim), (-rim, rim))], (225, 230, 230), 8, 4)
+    for k in range(count + 1):
+        place = step * k - end
+        cv2.polylines(table, [at((-end, place), (end, place))], False, (40, 40, 40), 4, cv2.LINE_AA, 4)
+        cv2.polylines(table, [at((place, -end), (place, end))], False, (40, 40, 40), 4, cv2.LINE_AA, 4)
+    small = cv2.resize(table, (640, 480), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+    small *= (1 - light * np.linspace(0, 1, 640, dtype=np.float32))[None, :, None]
+    small += np.random.default_rng(0).normal(0, 0.02, small.shape).astype(np.float32)
+    text = f"""SetCameraPose(rx=0, ry=0)
+for i in range(0, {count + 1}):
+    for j in range(0, {count + 1}):
+        Draw(x={step}*i - {end}, y={step}*j - {end})
+"""
+    return text, Image(small.clip(0, 1), np.ones((480, 640), bool))
+
+
+def test_the_crossings_on_the_rim_of_a_ruled_sheet_are_there() -> None:
+    text, sheet = ruled()
+    found = objects_of(loads(text), sheet)
+    assert len(found.objects) == 169 and absent(found) == set()
+
+
+def test_light_that_falls_off_along_the_pattern_makes_nothing_absent() -> None:
+    text, sheet = ruled(light=0.85)
+    assert absent(objects_of(loads(text), sheet)) == set()
+
+
+def test_stones_on_a_board_are_there_like_the_crossings() -> None:
+    text, board = ruled()
+    pixels = board.pixels.copy()
+    stones = {(i, j) for i in range(2, 8) for j in range(3, 9) if (i * 5 + j * 3) % 2 == 0}
+    for i, j in stones:
+        middle = (round(320 + 6.4 * (3 * i - 18)), round(240 + 6.4 * (3 * j - 18)))
+        cv2.circle(pixels, middle, 8, (0.05, 0.05, 0.05), -1, cv2.LINE_AA)
+    assert absent(objects_of(loads(text), dataclasses.replace(board, pixels=pixels))) == set()
+
+
+def test_the_absent_objects_of_a_program_are_counted() -> None:
+    shown = photo(LATTICE, missing=frozenset({"A1", "C4", "C5", "F9"}))
+    assert absent_of(loads(LATTICE), shown) == (4, 54)
 
 
 def test_what_the_photo_does_not_know_is_not_judged() -> None:

@@ -17,7 +17,8 @@ from p3i.paint.draw.bent import bent
 from p3i.paint.draw.render import RenderedPicture, render
 from p3i.paint.draw.view import View, camera_view
 from p3i.place import outlines
-from p3i.place.objects import THERE, Object, Objects, objects_of
+from p3i.place.objects import Object, Objects, objects_of
+from p3i.place.presence import THERE
 from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image, resized

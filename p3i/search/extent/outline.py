@@ -1,18 +1,25 @@
 """The outline of a lattice: index ranges and guards that say shortly which cells hold an object.
 
-Convention: `evidence` [R, C] holds, for cell (i, j) = (i_start + column, j_start + row), the log-odds that
-it holds an object: positive where it does, 0 where nothing is known (a hole, beyond the photo). An
-outline is a product of half-open ranges of i and j, cut by guards `a*i + b*j >= c` with small whole a, b.
-The best outline has the greatest sum of evidence inside, less what its numbers cost to say: the two-part
-description length, in nats.
+Convention: `evidence` [R, C] holds, for cell (i, j) = (i_start + column, j_start + row), the bits that speak
+for an object: positive where there is one, 0 where nothing is known. An outline is a product of half-open
+ranges of i and j, cut by guards `a*i + b*j >= c` with small whole a, b. The best outline has the greatest sum
+of evidence inside, less what its numbers cost to say: the two-part description length.
+
+Two things that ranges and guards cannot say are looked at in the end. A whole line of the outline that
+holds nothing divides two patterns, such as two fronts of one step; the part with more bits is the answer.
+And beyond each side may lie one more line whose cells are there by the halves towards the pattern, as the
+crossings along the rim of a ruled board are.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.vision.cell_bits import TOWARDS, best_rectangle
+
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 DIRECTIONS = tuple(
     (a, b)
@@ -22,23 +29,23 @@ DIRECTIONS = tuple(
 )
 """Normals of guards; those along i or j alone are what the ranges are for."""
 
-_GUARD_COST = 4.0  # nats to say that there is one more guard, and its threshold
-_SLOPE_COST = 1.0  # nats for each unit of |a| + |b| beyond 2
+_GUARD_BITS = 6.0  # which of the four diagonals, and its threshold
+_SLOPE_BITS = 1.5  # for each unit of |a| + |b| beyond 2
 _MOST_GUARDS = 3
 _ROUNDS = 6
-_IDLE = 1e-3  # what a cell without evidence costs, so that outlines do not reach out for nothing
+_IDLE = 1e-3  # bits that a cell costs, so that outlines do not reach out for nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in nats."""
+    """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in bits."""
 
     i_range: tuple[int, int]
     j_range: tuple[int, int]
     guards: tuple[tuple[int, int, int], ...]
     gain: float
 
-    def holds(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def holds(self, i: Indices, j: Indices) -> NDArray[np.bool_]:
         """Which of the cells i [N], j [N] lie inside, [N]; the two broadcast."""
         inside = (
             (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
@@ -48,15 +55,21 @@ class Outline:
         return inside
 
 
-def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outline | None:
-    """The outline of the greatest gain over `evidence` [I, J]; None where no cell has evidence for it."""
+def best_outline(
+    evidence: Array, *, halves: Array | None = None, i_start: int = 0, j_start: int = 0
+) -> Outline | None:
+    """The outline of the greatest gain over `evidence` [R, C]; None where no cell has evidence for it.
+
+    `halves` [4, R, C] is the evidence of half of each cell: the half towards greater i, smaller i, greater j
+    and smaller j.
+    """
     if not (evidence > 0).any():
         return None
     worth = evidence - _IDLE
     rows, columns = worth.shape
     i, j = np.meshgrid(np.arange(columns), np.arange(rows))
     found: list[Outline] = []
-    for first in (_best_rectangle(worth), _bounds(evidence > 0)):
+    for first in (best_rectangle(worth), _bounds(evidence > 0)):
         outline = _improved(worth, i, j, first, ())
         found.append(outline)
         while len(outline.guards) < _MOST_GUARDS:
@@ -68,6 +81,9 @@ def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outl
     found += [_improved(worth, i, j, _bounds(evidence > 0), guards) for guards in _diamonds(worth, i, j)]
     best = max(found, key=lambda outline: outline.gain)
     best = _without_idle_guards(worth, i, j, best)
+    best = _without_empty_lines(worth, i, j, best)
+    if halves is not None:
+        best = _with_rims(halves, i, j, best)
     i0, i1, j0, j1 = *best.i_range, *best.j_range
     return Outline(
         (i0 + i_start, i1 + i_start),
@@ -77,32 +93,6 @@ def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outl
     )
 
 
-def rectangle_gain(evidence: Array) -> float:
-    """The greatest sum of `evidence` [I, J] over a rectangle of cells, 0 for none."""
-    i0, i1, j0, j1 = _best_rectangle(evidence)
-    return max(0.0, float(evidence[j0:j1, i0:i1].sum()))
-
-
-def _best_rectangle(worth: Array) -> tuple[int, int, int, int]:
-    """(i0, i1, j0, j1) of the rectangle of the greatest sum (Kadane's rule over pairs of rows)."""
-    rows = worth.shape[0]
-    sums = np.vstack([np.zeros(worth.shape[1]), np.cumsum(worth, axis=0)])
-    best, at = -np.inf, (0, 1, 0, 1)
-    for j0 in range(rows):
-        bands = sums[j0 + 1 :] - sums[j0]
-        total = np.cumsum(bands, axis=1)
-        before = np.concatenate([np.zeros((len(bands), 1)), total[:, :-1]], axis=1)
-        lowest = np.minimum.accumulate(before, axis=1)
-        gain = total - lowest
-        k = int(gain.argmax())
-        band, stop = divmod(k, gain.shape[1])
-        if gain[band, stop] > best:
-            best = float(gain[band, stop])
-            start = int(before[band, : stop + 1].argmin())
-            at = (start, stop + 1, j0, j0 + band + 1)
-    return at
-
-
 def _bounds(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
     """The box of what is set."""
     columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
@@ -110,10 +100,12 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 
 def _cost(guards: tuple[tuple[int, int, int], ...]) -> float:
-    return sum(_GUARD_COST + _SLOPE_COST * (abs(a) + abs(b) - 2) for a, b, _ in guards)
+    return sum(_GUARD_BITS + _SLOPE_BITS * (abs(a) + abs(b) - 2) for a, b, _ in guards)
 
 
-def _inside(i: Array, j: Array, box: tuple[int, int, int, int] | None, guards: tuple) -> NDArray[np.bool_]:
+def _inside(
+    i: Indices, j: Indices, box: tuple[int, int, int, int] | None, guards: tuple
+) -> NDArray[np.bool_]:
     keep = np.ones(i.shape, bool)
     if box is not None:
         keep = (i >= box[0]) & (i < box[1]) & (j >= box[2]) & (j < box[3])
@@ -122,7 +114,7 @@ def _inside(i: Array, j: Array, box: tuple[int, int, int, int] | None, guards: t
     return keep
 
 
-def _best_threshold(worth: Array, at: Array) -> int:
+def _best_threshold(worth: Array, at: Indices) -> int:
     """The whole c for which the sum of worth over `at >= c` is greatest."""
     low = int(at.min())
     per = np.bincount((at - low).ravel(), weights=worth.ravel())
@@ -131,7 +123,11 @@ def _best_threshold(worth: Array, at: Array) -> int:
 
 
 def _improved(
-    worth: Array, i: Array, j: Array, box: tuple[int, int, int, int], guards: tuple[tuple[int, int, int], ...]
+    worth: Array,
+    i: Indices,
+    j: Indices,
+    box: tuple[int, int, int, int],
+    guards: tuple[tuple[int, int, int], ...],
 ) -> Outline:
     """Ranges and thresholds moved in turn, each to its best place given the others, until none moves."""
     for _ in range(_ROUNDS):
@@ -160,7 +156,7 @@ def _best_run(line: Array) -> tuple[int, int]:
     return int(before[: stop + 1].argmin()), stop + 1
 
 
-def _with_one_more(worth: Array, i: Array, j: Array, outline: Outline) -> Outline | None:
+def _with_one_more(worth: Array, i: Indices, j: Indices, outline: Outline) -> Outline | None:
     """The outline with the guard that gains most; None where none pays for itself.
 
     Besides the outline's own box, the box of all cells with evidence is tried: a guard may make room for
@@ -182,13 +178,13 @@ def _with_one_more(worth: Array, i: Array, j: Array, outline: Outline) -> Outlin
     return best if best is not None and best.gain > outline.gain else None
 
 
-def _diamonds(worth: Array, i: Array, j: Array) -> list[tuple[tuple[int, int, int], ...]]:
+def _diamonds(worth: Array, i: Indices, j: Indices) -> list[tuple[tuple[int, int, int], ...]]:
     """Triples of diagonal guards, each at its own best place: no guard alone gains much on a diamond."""
     sides = [(a, b, _best_threshold(worth, a * i + b * j)) for a in (-1, 1) for b in (-1, 1)]
     return [tuple(side for side in sides if side is not left_out) for left_out in sides]
 
 
-def _without_idle_guards(worth: Array, i: Array, j: Array, outline: Outline) -> Outline:
+def _without_idle_guards(worth: Array, i: Indices, j: Indices, outline: Outline) -> Outline:
     """The outline less guards that no longer earn their cost after the others have moved."""
     for guard in outline.guards:
         rest = tuple(g for g in outline.guards if g != guard)
@@ -196,3 +192,42 @@ def _without_idle_guards(worth: Array, i: Array, j: Array, outline: Outline) -> 
         if tried.gain >= outline.gain:
             return _without_idle_guards(worth, i, j, tried)
     return outline
+
+
+def _without_empty_lines(worth: Array, i: Indices, j: Indices, outline: Outline) -> Outline:
+    """The part of most bits between rows and columns that speak against objects by more than a guard."""
+    kept = np.where(outline.holds(i, j), worth, 0.0)
+    best: tuple[float, Outline] | None = None
+    for name, line, (start, stop) in (
+        ("i_range", kept.sum(axis=0), outline.i_range),
+        ("j_range", kept.sum(axis=1), outline.j_range),
+    ):
+        empty = np.flatnonzero(line[start:stop] < -_GUARD_BITS) + start
+        if len(empty) == 0:
+            continue
+        for first, last in zip((start, *(empty + 1)), (*empty, stop), strict=True):
+            bits = float(line[first:last].sum())
+            if first < last and (best is None or bits > best[0]):
+                best = bits, replace(outline, **{name: (int(first), int(last))})
+    if best is None:
+        return outline
+    part = replace(best[1], gain=best[0] - _cost(outline.guards))
+    return _without_empty_lines(worth, i, j, part)
+
+
+def _with_rims(halves: Array, i: Indices, j: Indices, outline: Outline) -> Outline:
+    """The outline with one more line on each side where the halves towards it speak for objects."""
+    (i0, i1), (j0, j1) = outline.i_range, outline.j_range
+    lines = [i == i0 - 1, i == i1, j == j0 - 1, j == j1]
+    guarded = _inside(i, j, None, outline.guards)
+    gains = []
+    for half, line, (right, down) in zip(halves, lines, TOWARDS, strict=True):
+        beside = line & guarded & outline.holds(i + right, j + down)
+        gains.append(float(half[beside].sum()))
+    more = [gain > 0 for gain in gains]
+    return Outline(
+        (i0 - more[0], i1 + more[1]),
+        (j0 - more[2], j1 + more[3]),
+        outline.guards,
+        outline.gain + sum(gain for gain in gains if gain > 0),
+    )

@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.search.extent.alike import Alike, between, look_alike, working_size
+from p3i.search.extent.alike import look_alike, working_size
+from p3i.vision.alike import Alike, between
 from p3i.vision.cells import cut, lab, median_cell
 from p3i.vision.motif import concentration, contrast, offsets, parts, symmetry
 

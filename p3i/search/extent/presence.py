@@ -1,31 +1,25 @@
 """The extent of a lattice: which of its cells hold an object, and the short outline that says so.
 
-Each cell of the lattice is compared with the common cell (alike.py). How often cells well inside
-the pattern fail that test, and cells well outside pass it, is estimated from the photo itself, which
-turns agreement into log-odds; the outline of the greatest evidence less description length is the answer
-(outline.py). What lies under a mask, behind a person or on the far side of the picture's border
-is unknown, and an outline may or may not run over it.
+What each cell says for an object is told in bits by p3i.vision.cell_bits; the outline with most bits less
+what it costs to say is the answer (outline.py). What lies under a mask or is too small to be judged is
+unknown: to draw an object there costs a bit, as a claim that nobody can check.
 """
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.search.extent.alike import Alike, Kind, look_alike, working_size
-from p3i.search.extent.outline import Outline, best_outline, rectangle_gain
-from p3i.vision.cells import agreement, shifted
-from p3i.vision.sheet import cell_sides_px, project
+from p3i.search.extent.alike import look_alike, working_size
+from p3i.search.extent.outline import Outline, best_outline
+from p3i.vision.cell_bits import cell_bits
+from p3i.vision.sheet import Box, cell_sides_px, cells_from_basis, project
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_SLACK = 0.09  # of a period: how far an object may lie from its place
-_FAILS, _PASSES = 0.3, 0.7  # of the scaled agreement: below no object, above surely one
-_MISSES = (0.04, 0.1, 0.2, 0.35, 0.5)  # shares of objects that do not look like the others
-_STRAYS = (0.02, 0.06, 0.15)  # shares of other things that do
-_LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
+_UNKNOWN_BITS = 1.0  # what it costs to claim an object that is unknown: as likely true as not
 
 
 def find_extent(
@@ -46,59 +40,26 @@ def find_extent(
     if support is not None and support.shape != mask.shape:
         support = cv2.resize(np.asarray(support, np.float32), mask.shape[::-1], interpolation=cv2.INTER_AREA)
     alike = look_alike(small, mask, matrix, basis, origin, support)
-    if alike is None or alike.level <= 0:
+    if alike is None:
         return None
-    evidence = _evidence(alike, mask.shape)
     box = alike.sheet.box
-    grid = evidence.reshape(box.rows, box.columns)
-    return best_outline(grid, i_start=box.i_start, j_start=box.j_start)
+    inside, shown = _middle_shows(cells_from_basis(matrix, basis, origin), box, mask.shape)
+    found = cell_bits(alike, shown)
+    if not (found.whole > 0).any():
+        return None
+    grid = (box.rows, box.columns)
+    return best_outline(
+        np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid),
+        halves=found.halves.reshape(4, *grid),
+        i_start=box.i_start,
+        j_start=box.j_start,
+    )
 
 
-def _indices(alike: Alike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    box = alike.sheet.box
-    i, j = np.meshgrid(np.arange(box.i_start, box.i_stop), np.arange(box.j_start, box.j_stop))
-    return i.ravel(), j.ravel()
-
-
-def _middle_shows(alike: Alike, shape: tuple[int, int]) -> Mask:
-    """Whether the middle of each cell [N] lies in the photo, large enough to be judged."""
-    i, j = _indices(alike)
-    points = np.stack([i, j], axis=-1).astype(float)
-    at, front = project(alike.image_from_cells, points)
-    shorter = cell_sides_px(alike.image_from_cells, points)[1]
+def _middle_shows(image_from_cells: Array, box: Box, shape: tuple[int, int]) -> tuple[Mask, Mask]:
+    """Whether the middle of each cell [N] lies in the photo, and whether it is large enough there."""
+    points = box.indices.astype(float)
+    at, front = project(image_from_cells, points)
+    shorter = cell_sides_px(image_from_cells, points)[1]
     inside = (at[:, 0] >= 0) & (at[:, 0] <= shape[1] - 1) & (at[:, 1] >= 0) & (at[:, 1] <= shape[0] - 1)
-    return front & inside & (shorter >= _SMALLEST_PX)
-
-
-def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
-    """Log-odds [N] that each cell holds an object."""
-    box, visible = alike.sheet.box, alike.visible
-    judged = _middle_shows(alike, shape) & (visible > _LEAST_VISIBLE)
-    if not judged.any():
-        return np.zeros(box.count)
-    score = np.maximum.reduce([_score(alike, kind, judged) for kind in alike.kinds])
-    passes = np.clip((score - _FAILS) / (_PASSES - _FAILS), 0, 1)
-    trust = judged * np.sqrt(visible)
-
-    def evidence(misses: float, strays: float) -> Array:
-        worst, best = np.log(misses / (1 - strays)), np.log((1 - misses) / strays)
-        return (worst + (best - worst) * passes) * trust
-
-    def support(misses: float, strays: float) -> float:
-        """Log-likelihood of all cells, with the pattern filling the rectangle that suits it best."""
-        without = float((trust * (passes * np.log(strays) + (1 - passes) * np.log(1 - strays))).sum())
-        return without + rectangle_gain(evidence(misses, strays).reshape(box.rows, box.columns))
-
-    rates = max(((m, s) for m in _MISSES for s in _STRAYS), key=lambda rate: support(*rate))
-    return evidence(*rates)
-
-
-def _score(alike: Alike, kind: Kind, judged: Mask) -> Floats:
-    """Agreement [N] of the cells with a kind of cell, scaled: 0 other things, 1 a typical one of the kind."""
-    slack = max(1, round(_SLACK * alike.sheet.side))
-    near = np.array([(x, y) for x in (-slack, 0, slack) for y in (-slack, 0, slack)])
-    fit = agreement(alike.cells, alike.cells_known, shifted(kind.template, near)).max(axis=1)
-    inside_level = float(np.average(fit, weights=kind.weights + 1e-9))
-    others = judged & (alike.weights < 0.1) & (kind.weights < 0.1)
-    outside_level = float(np.clip(np.median(fit[others]), 0, 0.3)) if others.sum() > 8 else 0.15
-    return (fit - outside_level) / max(inside_level - outside_level, 0.05)
+    return front & inside, front & inside & (shorter >= _SMALLEST_PX)

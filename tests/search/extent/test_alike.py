@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from p3i.search.extent.alike import between, look_alike, working_size
+from p3i.search.extent.alike import look_alike, working_size
+from p3i.vision.alike import between
 
 CELLS = [(i, j) for i in range(8) for j in range(8)]
 

@@ -72,6 +72,27 @@ def test_unknown_cells_are_free_but_not_reached_for():
     assert (outline.i_range, outline.j_range, outline.guards) == ((1, 9), (2, 6), ())
 
 
+def test_an_empty_line_parts_two_patterns_and_the_one_with_more_evidence_is_the_answer():
+    evidence = evidence_of(9, 12, lambda i, j: (i != 5) & (j >= 0))
+    outline = best_outline(evidence)
+    assert (outline.i_range, outline.j_range) == ((6, 12), (0, 9))
+    assert outline.gain <= evidence[:, 6:].sum()
+
+
+def test_a_line_that_is_empty_in_part_parts_nothing():
+    evidence = evidence_of(9, 12, lambda i, j: (i != 5) | (j < 5))
+    assert best_outline(evidence).i_range == (0, 12)
+
+
+def test_a_line_beyond_the_outline_is_drawn_where_the_halves_towards_it_speak_for_objects():
+    evidence = evidence_of(10, 10, lambda i, j: (i >= 2) & (i < 8) & (j >= 2) & (j < 8))
+    halves = np.full((4, 10, 10), -2.0)
+    halves[0, :, 1] = 3  # the halves towards greater i, beyond the first column
+    halves[3, 8, 2:8] = (3, 3, -1, 3, 3, -1)  # those towards smaller j, beyond the last row
+    outline = best_outline(evidence, halves=halves, i_start=5)
+    assert (outline.i_range, outline.j_range) == ((6, 13), (2, 9))
+
+
 def test_without_evidence_there_is_no_outline():
     assert best_outline(np.full((4, 5), -1.0)) is None
     assert best_outline(np.zeros((4, 5))) is None

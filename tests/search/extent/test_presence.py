@@ -92,6 +92,64 @@ def test_stones_count_as_objects_of_a_board_of_lines(draw_scene):
     assert cells_of(extent_of(scene, pixels=pixels), scene) == set(cells)
 
 
+def test_a_front_of_the_same_step_beyond_an_empty_column_is_another_pattern(draw_scene):
+    here = [(i, j) for i in range(5) for j in range(8)]
+    beyond = [(i, j) for i in range(6, 9) for j in range(8)]
+    scene = draw_scene(here + beyond, basis=((90.0, 0.0), (0.0, 100.0)))
+    assert cells_of(extent_of(scene), scene) == set(here)
+
+
+def test_the_crossings_on_the_rim_of_a_ruled_board_are_its_objects(draw_scene):
+    scene = draw_scene([])
+    corners = scene.origin + np.array([(0, 0), (6, 0), (6, 7), (0, 7)]) @ scene.basis
+
+    def at(points):
+        x, y, z = scene.image_from_plane @ np.c_[points, np.ones(len(points))].T
+        return np.round(np.stack([x / z, y / z], 1) * 16).astype(np.int32)
+
+    pixels = scene.pixels.copy()
+    outwards = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) @ scene.basis
+    for reach, colour in ((0.9, (0.15, 0.1, 0.1)), (0.3, (0.85, 0.7, 0.45))):  # a dark table, the board
+        cv2.fillPoly(pixels, [at(corners + reach * outwards)], colour, cv2.LINE_AA, 4)
+    for k in range(8):
+        for ends in ([(0, k), (6, k)], [(min(k, 6), 0), (min(k, 6), 7)]):
+            cv2.polylines(
+                pixels,
+                [at(scene.origin + np.array(ends) @ scene.basis)],
+                False,
+                (0.1,) * 3,
+                2,
+                cv2.LINE_AA,
+                4,
+            )
+    crossings = {(i, j) for i in range(7) for j in range(8)}
+    assert cells_of(extent_of(scene, pixels=pixels), scene) == crossings
+
+
+def test_a_pattern_that_changes_its_look_little_by_little_does_not_end_there(draw_scene):
+    cells = [(i, j) for i in range(13) for j in range(5)]
+    scene = draw_scene(cells, basis=((70.0, 0.0), (0.0, 100.0)), origin=(110.0, 250.0), radius=1)
+    pixels = scene.pixels.copy()
+    for i, j in cells:  # a bar that turns from one column to the next, by a quarter turn in all
+        turn = np.deg2rad(90 * i / 12)
+        along = 26 * np.array([np.cos(turn), np.sin(turn)])
+        middle = scene.origin + i * scene.basis[0] + j * scene.basis[1]
+        x, y, z = scene.image_from_plane @ np.c_[[middle - along, middle + along], [1, 1]].T
+        (a, b), (c, d) = np.round(np.stack([x / z, y / z], 1) * 16).astype(int).tolist()
+        cv2.line(pixels, (a, b), (c, d), (0.1, 0.2, 0.4), 5, cv2.LINE_AA, 4)
+    assert cells_of(extent_of(scene, pixels=pixels), scene) == set(cells)
+
+
+def test_half_objects_along_a_hole_are_not_drawn_into_it(draw_scene):
+    scene = draw_scene(RECTANGLE)
+    height, width = scene.valid.shape
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    at = np.stack([x, y, np.ones_like(x)], -1) @ np.linalg.inv(scene.image_from_plane).T
+    cell = (at[..., :2] / at[..., 2:] - scene.origin) @ np.linalg.inv(scene.basis)
+    hole = cell[..., 0] < 0.1  # it hides the middles of the first column, and shows the half of each object
+    assert cells_of(extent_of(scene, valid=~hole), scene) == {(i, j) for i, j in RECTANGLE if i > 0}
+
+
 def test_what_a_mask_hides_is_no_evidence(draw_scene):
     scene = draw_scene(RECTANGLE)
     pixels, valid = scene.pixels.copy(), scene.valid.copy()
