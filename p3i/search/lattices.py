@@ -175,7 +175,7 @@ def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None
         layout = filling_layout(session.evidence, pattern, layout)
     program = layout.program(from_zero=not session.config.strict)
     session.record("candidate", program=program, score=score, worth=worth(measured))
-    return Answer(program, "lattice", score, worth(measured), notes)
+    return Answer(program, "lattice", score, worth(measured), notes, readings=layout.readings)
 
 
 def _strict_note(free: Layout, strict: Layout, moved_px: float) -> str:

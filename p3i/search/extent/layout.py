@@ -1,6 +1,6 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
-from p3i.search.extent.phase import find_phase
+from p3i.search.extent.phase import find_phases
 from p3i.search.extent.presence import find_extent
 from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
@@ -23,6 +23,7 @@ from p3i.search.look.contrast import score_of
 from p3i.search.look.correlate import find_instances
 from p3i.search.look.evidence import Evidence, Level
 from p3i.search.look.thinned import thinned
+from p3i.search.result import Reading
 from p3i.vision.warp import in_frame
 
 # The last fit: on a map sharper by this, with so many samples along a cell's side, on at most so many objects
@@ -36,12 +37,16 @@ _REFITS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """A lattice with its objects: half-open index ranges and guards (a, b, c) for a*i + b*j >= c."""
+    """A lattice with its objects: half-open index ranges and guards (a, b, c) for a*i + b*j >= c.
+
+    `readings` are the places of the cell that may be its object, the likeliest first.
+    """
 
     lattice: Lattice
     i_range: tuple[int, int]
     j_range: tuple[int, int]
     guards: tuple[tuple[int, int, int], ...] = ()
+    readings: tuple[Reading, ...] = ()
 
     def holds(self, index: np.ndarray) -> np.ndarray:
         """Which rows of `index` [N, 2] the layout draws."""
@@ -81,21 +86,43 @@ class Layout:
 def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:
     """The objects of a lattice whose cells `ground` [N, 2] are sure: phase and extent from the photo.
 
+    They lie at the likeliest place of the cell, or at the one that the options ask for where the cell has it.
     None where no object is seen.
     """
     image = evidence.image
-    matrix = image_from_plane(
-        lattice.rx_deg, lattice.ry_deg, size=image.size, focal_mm=evidence.focal_mm
-    ).numpy()
-    support = _painted(evidence, ground, matrix, lattice)
-    origin = find_phase(image.pixels, image.valid, matrix, lattice.basis, support)
-    if origin is None:
+    matrix, support = _seen(evidence, lattice, ground)
+    phases = find_phases(image.pixels, image.valid, matrix, lattice.basis, support)
+    if not phases:
         return None
-    lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, origin)
+    asked = evidence.config.object
+    names = [phase.name or str(rank) for rank, phase in enumerate(phases, 1)]
+    at = next((k for k, name in enumerate(names) if asked in (name, str(k + 1))), 0)
+    origin = phases[at].origin
+    from_origin = [(phase.origin - origin) @ np.linalg.inv(lattice.basis) for phase in phases]
+    readings = tuple(
+        Reading(name, phase.probability, (float(step[0]), float(step[1])))
+        for name, phase, step in zip(names, phases, from_origin, strict=True)
+    )
+    return layout_at(evidence, replace(lattice, origin=origin), ground, readings=readings)
+
+
+def layout_at(
+    evidence: Evidence, lattice: Lattice, ground: Tensor, *, readings: tuple[Reading, ...]
+) -> Layout | None:
+    """The objects of a lattice that lie at its points, one of the `readings`; else as found_layout."""
+    image = evidence.image
+    matrix, support = _seen(evidence, lattice, ground)
     found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
     if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
         return None  # one row fixes no plane
-    return Layout(lattice, found.i_range, found.j_range, found.guards)
+    return Layout(lattice, found.i_range, found.j_range, found.guards, readings)
+
+
+def _seen(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """The homography of a lattice's camera [3, 3], and where the cells `ground` [N, 2] lie: bool [H, W]."""
+    size = evidence.image.size
+    matrix = image_from_plane(lattice.rx_deg, lattice.ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
+    return matrix, _painted(evidence, ground, matrix, lattice)
 
 
 def filling_layout(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
@@ -116,7 +143,8 @@ def filling_layout(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layo
     seen = in_front & in_frame(points, level.size)
     index = torch.cat([cells, around[seen]]).numpy().astype(int)
     low, high = index.min(0), index.max(0) + 1
-    return Layout(layout.lattice, (int(low[0]), int(high[0])), (int(low[1]), int(high[1])))
+    ranges = {"i_range": (int(low[0]), int(high[0])), "j_range": (int(low[1]), int(high[1]))}
+    return replace(layout, **ranges, guards=())
 
 
 def strict_layout(layout: Layout) -> tuple[Layout, float]:
@@ -179,7 +207,7 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
         theta = fit_instances(level, pattern, theta, found, weights=weights.double())
     if not sane(pattern, theta):
         return layout
-    return Layout(Lattice.of(pattern, theta), layout.i_range, layout.j_range, layout.guards)
+    return replace(layout, lattice=Lattice.of(pattern, theta))
 
 
 def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> float:

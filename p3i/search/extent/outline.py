@@ -31,12 +31,18 @@ _IDLE = 1e-3  # what a cell without evidence costs, so that outlines do not reac
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in nats."""
+    """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in nats.
+
+    `seen` is how many of its cells the photo shows, in parts of cells, and `there` how many of these hold an
+    object, where that is known.
+    """
 
     i_range: tuple[int, int]
     j_range: tuple[int, int]
     guards: tuple[tuple[int, int, int], ...]
     gain: float
+    there: float = 0.0
+    seen: float = 0.0
 
     def holds(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Which of the cells i [N], j [N] lie inside, [N]; the two broadcast."""

@@ -7,6 +7,8 @@ turns agreement into log-odds; the outline of the greatest evidence less descrip
 is unknown, and an outline may or may not run over it.
 """
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +50,14 @@ def find_extent(
     alike = look_alike(small, mask, matrix, basis, origin, support)
     if alike is None or alike.level <= 0:
         return None
-    evidence = _evidence(alike, mask.shape)
+    passes, trust = _passes(alike, mask.shape)
     box = alike.sheet.box
-    grid = evidence.reshape(box.rows, box.columns)
-    return best_outline(grid, i_start=box.i_start, j_start=box.j_start)
+    grid = _evidence(passes, trust, (box.rows, box.columns)).reshape(box.rows, box.columns)
+    outline = best_outline(grid, i_start=box.i_start, j_start=box.j_start)
+    if outline is None:
+        return None
+    inside = outline.holds(*_indices(alike))
+    return replace(outline, there=float((trust * passes)[inside].sum()), seen=float(trust[inside].sum()))
 
 
 def _indices(alike: Alike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -70,15 +76,19 @@ def _middle_shows(alike: Alike, shape: tuple[int, int]) -> Mask:
     return front & inside & (shorter >= _SMALLEST_PX)
 
 
-def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
-    """Log-odds [N] that each cell holds an object."""
-    box, visible = alike.sheet.box, alike.visible
+def _passes(alike: Alike, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """How surely each cell [N] holds an object, 0..1, and how far that is to be trusted [N], 0 for unseen."""
+    visible = alike.visible
     judged = _middle_shows(alike, shape) & (visible > _LEAST_VISIBLE)
     if not judged.any():
-        return np.zeros(box.count)
+        return np.zeros(len(visible)), np.zeros(len(visible))
     score = np.maximum.reduce([_score(alike, kind, judged) for kind in alike.kinds])
-    passes = np.clip((score - _FAILS) / (_PASSES - _FAILS), 0, 1)
-    trust = judged * np.sqrt(visible)
+    passes = np.clip((score - _FAILS) / (_PASSES - _FAILS), 0, 1).astype(float)
+    return passes, np.where(judged, np.sqrt(visible), 0).astype(float)
+
+
+def _evidence(passes: Array, trust: Array, shape: tuple[int, int]) -> Array:
+    """Log-odds [N] that each cell holds an object, for cells that lie in so many (rows, columns)."""
 
     def evidence(misses: float, strays: float) -> Array:
         worst, best = np.log(misses / (1 - strays)), np.log((1 - misses) / strays)
@@ -87,7 +97,7 @@ def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:
     def support(misses: float, strays: float) -> float:
         """Log-likelihood of all cells, with the pattern filling the rectangle that suits it best."""
         without = float((trust * (passes * np.log(strays) + (1 - passes) * np.log(1 - strays))).sum())
-        return without + rectangle_gain(evidence(misses, strays).reshape(box.rows, box.columns))
+        return without + rectangle_gain(evidence(misses, strays).reshape(shape))
 
     rates = max(((m, s) for m in _MISSES for s in _STRAYS), key=lambda rate: support(*rate))
     return evidence(*rates)
