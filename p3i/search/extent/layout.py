@@ -1,5 +1,6 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -11,7 +12,8 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
-from p3i.search.extent.phase import find_phases
+from p3i.search.extent.outline import Outline
+from p3i.search.extent.phase import Phase, find_phases
 from p3i.search.extent.presence import find_extent
 from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
@@ -33,6 +35,11 @@ _SIDE = 16
 _MOST_REFITTED = 300
 _FEWEST_REFITTED = 6
 _REFITS = 3
+# A place of the cell of at least this share of the likeliest's probability is a rival. Where both have an
+# object in each cell but for so few, every further object doubles the odds, up to so many times.
+_RIVAL = 0.05
+_FEW_MISSES = 0.04
+_MOST_BITS = 50.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,18 +99,49 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
     image = evidence.image
     matrix, support = _seen(evidence, lattice, ground)
     phases = find_phases(image.pixels, image.valid, matrix, lattice.basis, support)
+
+    def outline(phase: Phase) -> Outline | None:
+        return find_extent(image.pixels, image.valid, matrix, lattice.basis, phase.origin, support)
+
     if not phases:
         return None
+    phases, outlines = _weighed(phases, outline)
     asked = evidence.config.object
     names = [phase.name or str(rank) for rank, phase in enumerate(phases, 1)]
     at = next((k for k, name in enumerate(names) if asked in (name, str(k + 1))), 0)
-    origin = phases[at].origin
-    from_origin = [(phase.origin - origin) @ np.linalg.inv(lattice.basis) for phase in phases]
+    drawn = phases[at]
+    from_drawn = [(phase.origin - drawn.origin) @ np.linalg.inv(lattice.basis) for phase in phases]
     readings = tuple(
         Reading(name, phase.probability, (float(step[0]), float(step[1])))
-        for name, phase, step in zip(names, phases, from_origin, strict=True)
+        for name, phase, step in zip(names, phases, from_drawn, strict=True)
     )
-    return layout_at(evidence, replace(lattice, origin=origin), ground, readings=readings)
+    found = outlines[at] or outline(drawn)
+    return _layout(replace(lattice, origin=drawn.origin), found, readings)
+
+
+def _weighed(
+    phases: Sequence[Phase], outline: Callable[[Phase], Outline | None]
+) -> tuple[list[Phase], list[Outline | None]]:
+    """Phases with the probability that their objects give them, the likeliest first, with what was outlined.
+
+    `outline` says where a phase has objects. It is asked for the first one and for its rivals.
+    """
+    first = outline(phases[0])
+    outlines = [first, *(None for _ in phases[1:])]
+    if first is not None and _whole(first):
+        rivals = [k for k, one in enumerate(phases) if k and one.probability > _RIVAL * phases[0].probability]
+        for k in rivals:
+            outlines[k] = outline(phases[k])
+    more = [one.there - first.there if first and one and _whole(one) else 0.0 for one in outlines]
+    odds = np.array([phase.probability for phase in phases]) * 2.0 ** np.clip(more, -_MOST_BITS, _MOST_BITS)
+    odds /= odds.sum()
+    order = np.argsort(-odds, kind="stable")
+    return [replace(phases[k], probability=float(odds[k])) for k in order], [outlines[k] for k in order]
+
+
+def _whole(outline: Outline) -> bool:
+    """Whether next to all cells of an outline hold an object."""
+    return outline.there > (1 - _FEW_MISSES) * outline.seen
 
 
 def layout_at(
@@ -113,6 +151,10 @@ def layout_at(
     image = evidence.image
     matrix, support = _seen(evidence, lattice, ground)
     found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
+    return _layout(lattice, found, readings)
+
+
+def _layout(lattice: Lattice, found: Outline | None, readings: tuple[Reading, ...]) -> Layout | None:
     if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
         return None  # one row fixes no plane
     return Layout(lattice, found.i_range, found.j_range, found.guards, readings)
