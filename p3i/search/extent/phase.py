@@ -81,10 +81,15 @@ def _middle(mask: Mask, image_from_plane: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommonCell:
-    """The common cell as it looks: `colours` [3, side, side] (median Lab), `appearance` [4, side, side]."""
+    """The common cell as it looks: `colours` [3, side, side] (median Lab), `appearance` [4, side, side].
+
+    `cells` [N, 3, side, side] are the colours of each cell that it is taken from, known where `seen`.
+    """
 
     colours: Floats
     appearance: Floats
+    cells: Floats
+    seen: Mask
 
 
 def common_cell(alike: Alike) -> CommonCell:
@@ -92,7 +97,7 @@ def common_cell(alike: Alike) -> CommonCell:
     side = alike.sheet.side
     colours, seen = cut(lab(alike.sheet.values), side), cut(alike.sheet.seen, side)
     median, _ = median_cell(colours, seen, np.flatnonzero(_typical(alike)))
-    return CommonCell(median, _appearance(alike, median))
+    return CommonCell(median, _appearance(alike, median), colours, seen)
 
 
 def _typical(alike: Alike) -> Mask:
@@ -101,19 +106,17 @@ def _typical(alike: Alike) -> Mask:
 
 def phase_cues(alike: Alike, cell: CommonCell) -> dict[str, Array]:
     """What each witness says about an object's middle at each sample of the cell: arrays [side, side]."""
-    side, box = alike.sheet.side, alike.sheet.box
-    typical = _typical(alike)
+    box, typical = alike.sheet.box, _typical(alike)
     inside = typical | between(typical.reshape(box.rows, box.columns)).ravel()
     region = np.flatnonzero(inside & (alike.visible > 0.9))
     if len(region) < 3:
         region = np.flatnonzero(typical)
-    colours, seen = cut(lab(alike.sheet.values), side)[region], cut(alike.sheet.seen, side)[region]
     return {
         "symmetry": symmetry(alike.template),
         "contrast": contrast(cell.colours if alike.colour_share > 0.1 else cell.appearance),
         "parts": parts(cell.appearance),
         "texture": concentration((alike.template**2).sum(axis=0)),
-        "change": concentration(_change(colours, seen, cell.colours)),
+        "change": concentration(_change(cell.cells[region], cell.seen[region], cell.colours)),
         "whole": _whole(alike),
     }
 
