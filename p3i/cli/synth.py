@@ -41,7 +41,7 @@ from p3i.search.result import Candidate, StopReason
 )
 @grouped.group(
     "What to look for",
-    options.of(SearchConfig, "structure", "extent"),
+    options.of(SearchConfig, "structure", "extent", "object"),
     options.of(SearchConfig, "sketch", "start", sketch={"type": INPUT}, start={"type": INPUT}),
     options.of(SearchConfig, "strict"),
     click.option("--mask", type=INPUT, metavar="FILE", help="A picture whose white pixels are unknown."),
@@ -281,10 +281,9 @@ def _headed(texts: Sequence[str], candidates: Sequence[Candidate]) -> list[str]:
     """The texts of several candidates, each under a comment that says which it is; a single one as it is."""
     if len(texts) < 2:
         return list(texts)
-    heads = [f"{candidate.structure}, score {candidate.score:.4f}" for candidate in candidates]
     return [
-        f"# candidate {rank} of {len(texts)}: {head}\n{text}"
-        for rank, (head, text) in enumerate(zip(heads, texts, strict=False), start=1)
+        f"# candidate {rank} of {len(texts)}: {candidate.title}\n{text}"
+        for rank, (candidate, text) in enumerate(zip(candidates, texts, strict=False), start=1)
     ]
 
 

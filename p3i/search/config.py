@@ -23,6 +23,8 @@ MOST_K1 = 0.4
 
 EXTENTS: tuple[Extent, ...] = get_args(Extent)
 RECIPES: tuple[Recipe, ...] = get_args(Recipe)
+OBJECTS: tuple[str, ...] = ("crossing", "field", "dark", "light")
+"""The names that places of a lattice's cell have (p3i.vision.motif.named_places)."""
 FEATURES: tuple[str, ...] = ("oriented", "rgb", "lite0", "alexnet")
 """The names of p3i.vision.features.EXTRACTORS, repeated here so that `--help` need not load torch."""
 
@@ -75,6 +77,12 @@ class SearchConfig:
         "How to search: p3i, or paper for the paper's own way, for comparison: equation 2 as printed, "
         "a grid of 2 units, gradient descent, and its own features and extent.",
     ] = "p3i"
+    object: Annotated[
+        str | None,
+        "Which place of a lattice's cell is its object: where lines cross, the field between them, what is "
+        "dark or light, or the place of this number, as --top lists them. By default the likeliest.",
+        Spelt(metavar="|".join((*OBJECTS, "N"))),
+    ] = None
     exhaustive_s: Annotated[
         float | None,
         "Seconds to walk through sketches of no known family as well, the shortest first.",
@@ -100,6 +108,7 @@ class SearchConfig:
             _one_of("features", part, FEATURES)
         _one_of("extent", self.extent_used, EXTENTS)
         self._check_asked()
+        self._check_object()
         if isinstance(self.focal_mm, str):
             _one_of("the focal length, where no number,", self.focal_mm, ("auto",))
         else:
@@ -169,6 +178,20 @@ class SearchConfig:
             raise UsageError("--exhaustive walks sketches outside Table 1: leave out --strict")
         if self.extent == "image" and self.structure in ("circular", "hybrid"):
             raise UsageError(f"--extent image continues lattices only: leave it out for {self.structure}")
+
+    def _check_object(self) -> None:
+        """Which place of the cell is the object: a name or a number, where there is a cell to choose in."""
+        if self.object is None:
+            return
+        if self.object not in OBJECTS and not (self.object.isdecimal() and int(self.object) > 0):
+            raise UsageError(f"the object is {', '.join(OBJECTS)} or a number from 1, not {self.object!r}")
+        asked = [name for name in ("sketch", "start") if getattr(self, name) is not None]
+        asked += ["recipe paper"] if self.recipe == "paper" else []
+        asked += ["strict"] if self.strict else []
+        if asked:
+            raise UsageError(f"--{asked[0]} says itself where the objects are: leave out --object")
+        if self.structure in ("circular", "hybrid"):
+            raise UsageError(f"--object chooses in the cell of a lattice: leave it out for {self.structure}")
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -13,6 +13,7 @@ from p3i.search.look.session import Session
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
 from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
+from p3i.search.readings import offers, other_readings, reading_notes
 from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
 from p3i.vision.image import Image
 
@@ -44,6 +45,11 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         return refused
     good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
     first = good[0]
+    if not offers(first, config):
+        stop = StopReason.NO_SUCH_OBJECT
+        refused = told(config, assumed, None, stop, score=first.score, readings=first.readings)
+        look.record("answer", program=None, score=first.score, reason=refused.reason)
+        return refused
     runner_up = max((answer.worth for answer in good[1:]), default=0.0)
     margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(look, first)
@@ -53,12 +59,14 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
     if config.extent_used == "image" and first.structure != "lattice":
         notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
+    notes = (*notes, *reading_notes(first, config))
     if look.unwritable - {first.structure}:
         notes = (*notes, unwritable_note(look))
     centers = centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1)
     by_score = first.score >= needed
     if not by_score and config.extent_used == "found":
         notes = (*notes, faint_note(first, len(centers)))
+    elsewhere = other_readings(look, first, most=config.top - 1)
     look.tell("done", 1.0)
     look.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return told(
@@ -77,10 +85,13 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
                 score=answer.score,
                 structure=answer.structure,
                 false_alarms=None if asked else false_alarms(answer.worth),
+                reading=next((one for one in answer.readings if one.drawn), None),
+                same_lattice=answer in elsewhere,
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
-            for answer in good[: config.top]
+            for answer in [first, *elsewhere, *good[1:]][: config.top]
         ),
+        readings=first.readings,
         centers=centers,
         region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
         lens_k1=first.lens_k1,

@@ -44,16 +44,49 @@ class StopReason(Enum):
     OUT_OF_SIGHT = "no regular pattern: most objects of what was found would lie outside the picture"
     NO_FIT = "the sketch does not fit this photo"
     OUTSIDE_TABLE_1 = "the pattern that was found cannot be written in the paper's Table 1, as strict asks"
+    NO_SUCH_OBJECT = "the cell of the lattice that was found has no such place"
     TOO_SMALL = "the picture is too small to hold a pattern"
     FLAT = "the picture has too little contrast to hold a pattern"
     TOO_LITTLE_KNOWN = "too few pixels of the picture are known (the rest is masked or transparent)"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A place of a lattice's cell that may be its object.
+
+    `name` is what is there, `crossing`, `field`, `dark` or `light`, else its rank, from 1; `probability` that
+    it is the object; `steps` how many of i and of j it lies from the objects that are drawn, 0 for these.
+    """
+
+    name: str
+    probability: float
+    steps: tuple[float, float]
+
+    @property
+    def drawn(self) -> bool:
+        """Whether the program draws this one."""
+        return self.steps == (0.0, 0.0)
+
+    @property
+    def phrase(self) -> str:
+        """What is there, in words that follow "objects on"."""
+        return _PHRASES.get(self.name, f"place {self.name} of the cell")
+
+
+_PHRASES: Mapping[str, str] = {
+    "crossing": "the crossings",
+    "field": "the fields",
+    "dark": "the dark places",
+    "light": "the light places",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """One program that the search weighed, with its normalised score (docs/search.md) and its own focal.
 
-    `false_alarms` as in SynthesisResult.
+    `false_alarms` as in SynthesisResult. `reading` is the place of the cell that a lattice's objects are on,
+    None for others. `same_lattice`: it is the answer's lattice, its objects on another place of the cell.
     """
 
     program: Program
@@ -63,12 +96,24 @@ class Candidate:
     focal_source: FocalSource = "default"
     focal_reason: str = ""
     false_alarms: float | None = None
+    reading: Reading | None = None
+    same_lattice: bool = False
+
+    @property
+    def title(self) -> str:
+        """What it is, for people: "lattice, score 0.3500", "the same lattice, objects on the fields, ..."."""
+        parts = ["the same lattice" if self.same_lattice else self.structure]
+        if self.reading is not None:
+            parts.append(f"objects on {self.reading.phrase} ({self.reading.probability:.2f})")
+        return ", ".join([*parts, f"score {self.score:.4f}"])
 
     def record(self) -> dict[str, Any]:
         """The candidate as JSON has it."""
         return {
             "program": format_program(self.program),
             "structure": self.structure,
+            **_object_facts(self.reading),
+            "same_lattice": self.same_lattice,
             "focal": self.focal_mm,
             "score": _rounded(self.score),
             "false_alarms": self.false_alarms,
@@ -96,6 +141,8 @@ class SynthesisResult:
     plane's normal; None without a program.
     `mirrored` is the other tilt, (rx, ry) in degrees, that a ring's objects fit about as well, None where the
     two can be told apart.
+    `readings` are the places of a lattice's cell that may be its object, the likeliest first; empty for
+    others. With StopReason.NO_SUCH_OBJECT they are what the cell offers in place of the one asked for.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
     """
 
@@ -117,6 +164,7 @@ class SynthesisResult:
     features: str = ""
     seed: int = 0
     pose_sigma_deg: float | None = None
+    readings: tuple[Reading, ...] = ()
     mirrored: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 
@@ -129,7 +177,14 @@ class SynthesisResult:
             and self.needed is not None
         ):
             return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
+        if self.stop is StopReason.NO_SUCH_OBJECT:
+            return f"{self.stop.value} (it offers {', '.join(reading.name for reading in self.readings)})"
         return self.stop.value
+
+    @property
+    def reading(self) -> Reading | None:
+        """The place of a lattice's cell that the objects of `program` are on; None for rings and hybrids."""
+        return next((one for one in self.readings if one.drawn and self.program is not None), None)
 
     def record(self, *, image: str | None = None, seconds: float | None = None) -> dict[str, Any]:
         """The answer as JSON has it, a line of `p3i synth --format jsonl`; its keys in the documented order.
@@ -162,6 +217,7 @@ class SynthesisResult:
             "height": height,
             "program": format_program(program),
             "structure": self.structure,
+            **_object_facts(self.reading),
             "camera": camera,
             "centers": [[round(x, 2), round(y, 2), i, j] for x, y, i, j in self.centers],
             "region": [[round(x, 1), round(y, 1)] for x, y in self.region],
@@ -176,6 +232,14 @@ class SynthesisResult:
         if len(self.candidates) > 1:
             record["candidates"] = [candidate.record() for candidate in self.candidates]
         return record
+
+
+def _object_facts(reading: Reading | None) -> dict[str, Any]:
+    """Which place of the cell is the object, and how surely, as JSON has it."""
+    return {
+        "object": None if reading is None else reading.name,
+        "object_confidence": None if reading is None else _rounded(reading.probability),
+    }
 
 
 def _rounded(value: float | None) -> float | None:

@@ -193,8 +193,9 @@ def _by_bits(look: Session, best: Best) -> list[Answer]:
 
 def _finished(look: Session, fit: Fit) -> Answer | None:
     """A lattice that was fitted, as an answer."""
-    found = drawn(look, sketches(SearchConfig(structure="lattice"))[0], fit, None)
-    return None if found is None else Answer(found.program, "lattice", found.sure, worth(found.fit))
+    sketch = sketches(SearchConfig(structure="lattice"))[0]
+    found = drawn(look, sketch, fit, None)
+    return None if found is None else answers_of(look, sketch, found)[0]
 
 
 def _finished_anew(look: Session, answer: Answer) -> Answer | None:

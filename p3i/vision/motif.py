@@ -2,7 +2,8 @@
 
 A cell repeats without a border of its own, so it is a torus: arrays [C, n, n] or [n, n] whose opposite
 sides meet. Each cue is an array [n, n]: entry [y, x] says how much speaks for an object centred on sample
-(x, y). None of them is sure of itself; p3i.search.extent.phase weighs them against each other.
+(x, y). None of them is sure of itself; p3i.search.extent.phase weighs them against each other. And some
+places of a cell have a name of their own, whatever the object is: where lines cross, or a dark field is.
 """
 
 import cv2
@@ -19,6 +20,9 @@ _LEAST_PART, _FULL_PART = (
     0.15,
 )  # shares of the cell: smaller parts are noise, from the second on they count fully
 _VOTE_WIDTH = 0.08  # of a period
+_THIN = 0.4  # of a cell: what covers less and runs on from cell to cell are lines, and the rest is ground
+_PLAIN = 0.04  # of lightness 0..1: a cell that varies by less has no dark or light in it
+_WIDE = 0.2  # of a period: a field's middle is where least lies so near
 
 
 def offsets(n: int) -> tuple[Array, Array]:
@@ -116,3 +120,45 @@ def _vote(votes: Array, region: NDArray[np.uint8], slope: NDArray) -> None:
         at_x = (middles[k][0] + x + (width - 1) / 2) / 2
         at_y = (middles[k][1] + y + (height - 1) / 2) / 2
         votes[round(at_y) % n, round(at_x) % n] += sharp[k] * min(1.0, np.sqrt(area / (_FULL_PART * n * n)))
+
+
+def named_places(lightness: NDArray) -> dict[str, tuple[int, int]]:
+    """The places (row, column) of a cell [n, n] that have a name, by its lightness 0..1.
+
+    `crossing` and `field` are where lines that run through all cells are densest, and where they are
+    farthest; without such lines `dark` and `light` are the middles of what is darker and what is lighter, as
+    far as it is no ground that covers most of the cell: both on a chequered floor, one for discs on a wall.
+    """
+    low, high = float(lightness.min()), float(lightness.max())
+    if high - low < _PLAIN:
+        return {}
+    grey = np.round(255 * (lightness - low) / (high - low)).astype(np.uint8)
+    threshold, _ = cv2.threshold(grey, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+    light = grey > threshold
+    for thin in (light, ~light):
+        if thin.mean() < _THIN and _runs_on(thin):
+            near = _blurred(thin, _VOTE_WIDTH), -_blurred(thin, _WIDE)
+            return {name: _top(by) for name, by in zip(("crossing", "field"), near, strict=True)}
+    parts = {"dark": ~light, "light": light}
+    return {name: _top(_blurred(part, _WIDE)) for name, part in parts.items() if part.mean() <= 1 - _THIN}
+
+
+def _runs_on(region: NDArray[np.bool_]) -> bool:
+    """Whether a region of the torus [n, n] hangs together from cell to cell, along x and along y."""
+    n = len(region)
+    _, labels = cv2.connectedComponents(np.tile(region, (3, 3)).astype(np.uint8), connectivity=4)
+    here = labels[n : 2 * n, n : 2 * n]
+    onward = labels[n : 2 * n, 2 * n :], labels[2 * n :, n : 2 * n]
+    return all(bool(((here == there) & region).any()) for there in onward)
+
+
+def _blurred(region: NDArray, width: float) -> Array:
+    """The share of a region [n, n] about each place of the torus: a Gaussian of `width` periods."""
+    x, y = offsets(len(region))
+    return correlate(region.astype(float), np.exp(-(x**2 + y**2) / (2 * width**2)))
+
+
+def _top(values: Array) -> tuple[int, int]:
+    """The (row, column) of the greatest value."""
+    row, column = divmod(int(values.argmax()), values.shape[1])
+    return row, column

@@ -1,6 +1,7 @@
 """The shell of `p3i synth`, around a search that is told what to answer by the colour of the photo."""
 
 import contextlib
+import dataclasses
 import json
 import os
 import shlex
@@ -18,10 +19,13 @@ import p3i
 from p3i.cli.main import run
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search.config import SearchConfig
-from p3i.search.result import FOCAL_REASONS, Candidate, StopReason, SynthesisResult
+from p3i.search.result import FOCAL_REASONS, Candidate, Reading, StopReason, SynthesisResult
 
 # What the search is to do with a photo of this grey level.
 FINDS, FINDS_NOTHING, HAS_A_BUG, IS_INTERRUPTED, IS_LATE, FINDS_A_RING = 200, 0, 40, 80, 120, 160
+HAS_TWO_READINGS = 240
+UNSURE = "what of the cell is its object is not sure: drawn on the crossings (0.70)"
+READINGS = (Reading("crossing", 0.7, (0.0, 0.0)), Reading("field", 0.25, (0.5, 0.5)))
 
 
 def lattice(step: float, start: float = -30) -> Program:
@@ -65,9 +69,17 @@ class Search:
         found = [
             Candidate(program=lattice(s, start), score=s / 100, structure="lattice") for s in (12.0, 6.0, 3.0)
         ]
+        unsure = level == HAS_TWO_READINGS
+        if unsure:
+            found = [
+                dataclasses.replace(one, reading=reading, same_lattice=k > 0)
+                for k, (one, reading) in enumerate(zip(found, READINGS, strict=False))
+            ]
         return SynthesisResult(
             program=found[0].program,
             stop=stop or StopReason.FOUND,
+            readings=READINGS if unsure else (),
+            notes=(UNSURE,) if unsure else (),
             structure="lattice",
             score=0.87654321,
             margin=0.21,
@@ -124,8 +136,8 @@ def test_jsonl_has_the_documented_keys_in_order(photo, capsys) -> None:
     assert run(["synth", "--format", "jsonl", photo("a.png")]) == 0
     record = json.loads(capsys.readouterr().out)
     assert list(record) == [
-        "image", "width", "height", "program", "structure", "camera", "centers",
-        "region", "score", "margin", "false_alarms", "absent", "seconds", "features", "seed",
+        "image", "width", "height", "program", "structure", "object", "object_confidence", "camera",
+        "centers", "region", "score", "margin", "false_alarms", "absent", "seconds", "features", "seed",
     ]  # fmt: skip
     assert (record["image"], record["width"], record["height"]) == ("a.png", 64, 48)
     assert record["camera"] == {
@@ -337,6 +349,18 @@ def test_top_prints_programs_one_after_another_each_under_its_score(photo, capsy
     assert p3i.load("b.2.p3p").world == lattice(6.0).world
 
 
+def test_top_tells_the_other_places_of_the_cell_as_the_same_lattice(photo, search, capsys, golden) -> None:
+    assert run(["synth", "--top", "2", photo("a.png", HAS_TWO_READINGS)]) == 0
+    captured = capsys.readouterr()
+    golden(Path(__file__).with_name("golden") / "synth-readings.p3p", captured.out)
+    assert captured.err == f"note: a.png: {UNSURE}\n"
+    assert run(["synth", "--top", "2", "--format", "jsonl", "a.png"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert (record["object"], record["object_confidence"]) == ("crossing", 0.7)
+    told = [(one["object"], one["object_confidence"], one["same_lattice"]) for one in record["candidates"]]
+    assert told == [("crossing", 0.7, False), ("field", 0.25, True)]
+
+
 def test_top_lists_candidates(photo, capsys) -> None:
     assert run(["synth", "--format", "jsonl", "--top", "2", photo("a.png")]) == 0
     candidates = json.loads(capsys.readouterr().out)["candidates"]
@@ -355,6 +379,8 @@ def test_trace_writes_the_steps_of_each_photo(photo) -> None:
 def test_every_option_of_the_search_arrives_there(photo, search) -> None:
     photo("a.png")
     search_words = "--structure lattice --extent image --focal 28 --features rgb --strict --time 3.5"
+    assert run(["synth", photo("b.png"), "--object", "field"]) == 0
+    assert search.configs.pop() == SearchConfig(object="field")
     words = shlex.split(f"{search_words} --top 2 --seed 7 --threads 2 --format jsonl")
     assert run(["synth", "a.png", *words]) == 0
     assert search.configs == [

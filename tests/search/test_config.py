@@ -78,6 +78,12 @@ def test_features_may_be_joined() -> None:
         ({"start": SKETCH.template, "lens": -0.1}, "leave out --lens"),
         ({"exhaustive_s": 3.0, "strict": True}, "leave out --strict"),
         ({"structure": "circular", "extent": "image"}, "continues lattices only"),
+        ({"object": "hole"}, "the object is crossing, field, dark, light or a number from 1, not 'hole'"),
+        ({"object": "0"}, "a number from 1, not '0'"),
+        ({"object": "dark", "structure": "hybrid"}, "leave it out for hybrid"),
+        ({"object": "dark", "strict": True}, "--strict says itself where the objects are"),
+        ({"object": "dark", "recipe": "paper"}, "--recipe paper says itself where the objects are"),
+        ({"object": "dark", "sketch": SKETCH}, "--sketch says itself where the objects are"),
     ],
 )
 def test_a_value_out_of_range_is_refused_with_a_reason(options: dict, reason: str) -> None:

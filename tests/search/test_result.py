@@ -3,7 +3,7 @@
 import pytest
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, Header, Program
-from p3i.search.result import StopReason, SynthesisResult
+from p3i.search.result import Candidate, Reading, StopReason, SynthesisResult
 
 PROGRAM = Program(CameraPose(), Draw(x=Affine(), y=Affine()))
 
@@ -44,3 +44,41 @@ def test_a_record_tells_how_well_the_tilt_is_known() -> None:
     program = Program(CameraPose(), Draw(x=Affine(), y=Affine()), header=Header(canvas=(40, 30)))
     result = SynthesisResult(program=program, stop=StopReason.FOUND, pose_sigma_deg=0.217)
     assert result.record(image="a.jpg", seconds=1.0)["camera"]["pose_sigma_deg"] == 0.217
+
+
+CROSSING, FIELD = Reading("crossing", 0.70446, (0.0, 0.0)), Reading("field", 0.25, (0.5, 0.5))
+
+
+def test_a_record_tells_which_place_of_the_cell_is_the_object() -> None:
+    program = Program(CameraPose(), Draw(x=Affine(), y=Affine()), header=Header(canvas=(40, 30)))
+    lattice = SynthesisResult(program=program, stop=StopReason.FOUND, readings=(CROSSING, FIELD))
+    record = lattice.record(image="a.jpg", seconds=1.0)
+    assert (record["object"], record["object_confidence"]) == ("crossing", 0.7045)
+    record = SynthesisResult(program=program, stop=StopReason.FOUND).record(image="a.jpg", seconds=1.0)
+    assert (record["object"], record["object_confidence"]) == (None, None)
+
+
+def test_a_refusal_of_a_place_names_those_that_the_cell_offers() -> None:
+    told = (CROSSING, FIELD, Reading("3", 0.02, (0.5, 0.0)))
+    refused = SynthesisResult(program=None, stop=StopReason.NO_SUCH_OBJECT, readings=told)
+    assert refused.reason.endswith("has no such place (it offers crossing, field, 3)")
+    assert refused.reading is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "title"),
+    [
+        ({}, "lattice, score 0.3500"),
+        ({"reading": CROSSING}, "lattice, objects on the crossings (0.70), score 0.3500"),
+        (
+            {"reading": FIELD, "same_lattice": True},
+            "the same lattice, objects on the fields (0.25), score 0.3500",
+        ),
+        (
+            {"reading": Reading("3", 0.02, (0.0, 0.0))},
+            "lattice, objects on place 3 of the cell (0.02), score 0.3500",
+        ),
+    ],
+)
+def test_a_candidate_is_titled_by_what_it_is(changes: dict, title: str) -> None:
+    assert Candidate(program=PROGRAM, score=0.35, structure="lattice", **changes).title == title

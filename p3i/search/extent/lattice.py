@@ -60,7 +60,7 @@ def _drawn(look: Session, found: Layout) -> Drawn | None:
     sure = score_of(measured.contrast)
     if look.config.extent_used == "image":
         layout = filling_layout(look.evidence, layout)
-    return Drawn(layout.program(from_zero=not look.config.strict), measured, sure, notes)
+    return Drawn(layout.program(from_zero=not look.config.strict), measured, sure, notes, layout.readings)
 
 
 def _strict_note(free: Layout, strict: Layout, moved_px: float) -> str:

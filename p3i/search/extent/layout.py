@@ -1,5 +1,6 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -10,7 +11,8 @@ from torch import Tensor
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
-from p3i.search.extent.phase import find_phase
+from p3i.search.extent.outline import Outline
+from p3i.search.extent.phase import Phase, find_phases
 from p3i.search.extent.presence import find_extent
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import sane, side_of_cell, weighed
@@ -23,22 +25,32 @@ from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import Evidence
+from p3i.search.result import Reading
 from p3i.vision.warp import in_frame
 
 # Fewer objects are not fitted once more.
 _FEWEST_REFITTED = 6
 # A proposal is shown so many steps to each side.
 _SHOWN = (-6, 7)
+# A place of the cell of at least this share of the likeliest's probability is a rival. Where both have an
+# object in each cell but for so few, every further object doubles the odds, up to so many times.
+_RIVAL = 0.05
+_FEW_MISSES = 0.04
+_MOST_BITS = 50.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """A lattice with its objects: half-open index ranges and guards (a, b, c) for a*i + b*j >= c."""
+    """A lattice with its objects: half-open index ranges and guards (a, b, c) for a*i + b*j >= c.
+
+    `readings` are the places of the cell that may be its object, the likeliest first.
+    """
 
     lattice: Lattice
     i_range: tuple[int, int]
     j_range: tuple[int, int]
     guards: tuple[tuple[int, int, int], ...] = ()
+    readings: tuple[Reading, ...] = ()
 
     def holds(self, index: np.ndarray) -> np.ndarray:
         """Which rows of `index` [N, 2] the layout draws."""
@@ -94,21 +106,78 @@ def supported(fit: Fit) -> Program:
 def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:
     """The objects of a lattice whose cells `ground` [N, 2] are sure: phase and extent from the photo.
 
+    They lie at the likeliest place of the cell, or at the one that the options ask for where the cell has it.
     None where no object is seen.
     """
     image = evidence.image
-    matrix = image_from_plane(
-        lattice.rx_deg, lattice.ry_deg, size=image.size, focal_mm=evidence.focal_mm
-    ).numpy()
-    support = _painted(evidence, ground, matrix, lattice)
-    origin = find_phase(image.pixels, image.valid, matrix, lattice.basis, support)
-    if origin is None:
+    matrix, support = _seen(evidence, lattice, ground)
+    phases = find_phases(image.pixels, image.valid, matrix, lattice.basis, support)
+
+    def outline(phase: Phase) -> Outline | None:
+        return find_extent(image.pixels, image.valid, matrix, lattice.basis, phase.origin, support)
+
+    if not phases:
         return None
-    lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, origin)
+    phases, outlines = _weighed(phases, outline)
+    asked = evidence.config.object
+    names = [phase.name or str(rank) for rank, phase in enumerate(phases, 1)]
+    at = next((k for k, name in enumerate(names) if asked in (name, str(k + 1))), 0)
+    drawn = phases[at]
+    from_drawn = [(phase.origin - drawn.origin) @ np.linalg.inv(lattice.basis) for phase in phases]
+    readings = tuple(
+        Reading(name, phase.probability, (float(step[0]), float(step[1])))
+        for name, phase, step in zip(names, phases, from_drawn, strict=True)
+    )
+    found = outlines[at] or outline(drawn)
+    return _layout(replace(lattice, origin=drawn.origin), found, readings)
+
+
+def _weighed(
+    phases: Sequence[Phase], outline: Callable[[Phase], Outline | None]
+) -> tuple[list[Phase], list[Outline | None]]:
+    """Phases with the probability that their objects give them, the likeliest first, with what was outlined.
+
+    `outline` says where a phase has objects. It is asked for the first one and for its rivals.
+    """
+    first = outline(phases[0])
+    outlines = [first, *(None for _ in phases[1:])]
+    if first is not None and _whole(first):
+        rivals = [k for k, one in enumerate(phases) if k and one.probability > _RIVAL * phases[0].probability]
+        for k in rivals:
+            outlines[k] = outline(phases[k])
+    more = [one.there - first.there if first and one and _whole(one) else 0.0 for one in outlines]
+    odds = np.array([phase.probability for phase in phases]) * 2.0 ** np.clip(more, -_MOST_BITS, _MOST_BITS)
+    odds /= odds.sum()
+    order = np.argsort(-odds, kind="stable")
+    return [replace(phases[k], probability=float(odds[k])) for k in order], [outlines[k] for k in order]
+
+
+def _whole(outline: Outline) -> bool:
+    """Whether next to all cells of an outline hold an object."""
+    return outline.there > (1 - _FEW_MISSES) * outline.seen
+
+
+def layout_at(
+    evidence: Evidence, lattice: Lattice, ground: Tensor, *, readings: tuple[Reading, ...]
+) -> Layout | None:
+    """The objects of a lattice that lie at its points, one of the `readings`; else as found_layout."""
+    image = evidence.image
+    matrix, support = _seen(evidence, lattice, ground)
     found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
+    return _layout(lattice, found, readings)
+
+
+def _layout(lattice: Lattice, found: Outline | None, readings: tuple[Reading, ...]) -> Layout | None:
     if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
         return None  # one row fixes no plane
-    return Layout(lattice, found.i_range, found.j_range, found.guards)
+    return Layout(lattice, found.i_range, found.j_range, found.guards, readings)
+
+
+def _seen(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    """The homography of a lattice's camera [3, 3], and where the cells `ground` [N, 2] lie: bool [H, W]."""
+    size = evidence.image.size
+    matrix = image_from_plane(lattice.rx_deg, lattice.ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
+    return matrix, _painted(evidence, ground, matrix, lattice)
 
 
 def filling_layout(evidence: Evidence, layout: Layout) -> Layout:
@@ -130,7 +199,8 @@ def filling_layout(evidence: Evidence, layout: Layout) -> Layout:
     seen = in_front & in_frame(points, level.size)
     index = torch.cat([cells, around[seen]]).numpy().astype(int)
     low, high = index.min(0), index.max(0) + 1
-    return Layout(layout.lattice, (int(low[0]), int(high[0])), (int(low[1]), int(high[1])))
+    ranges = {"i_range": (int(low[0]), int(high[0])), "j_range": (int(low[1]), int(high[1]))}
+    return replace(layout, **ranges, guards=())
 
 
 def strict_layout(layout: Layout) -> tuple[Layout, float]:

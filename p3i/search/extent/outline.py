@@ -38,12 +38,17 @@ _IDLE = 1e-3  # bits that a cell costs, so that outlines do not reach out for no
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in bits."""
+    """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in bits.
+
+    `seen` is how many of its cells can be judged, and `there` how many of these speak for an object.
+    """
 
     i_range: tuple[int, int]
     j_range: tuple[int, int]
     guards: tuple[tuple[int, int, int], ...]
     gain: float
+    there: int = 0
+    seen: int = 0
 
     def holds(self, i: Indices, j: Indices) -> NDArray[np.bool_]:
         """Which of the cells i [N], j [N] lie inside, [N]; the two broadcast."""

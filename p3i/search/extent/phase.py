@@ -1,4 +1,4 @@
-"""The phase of a lattice: where in the cell the middle of its object is.
+"""The phase of a lattice: where in the cell the middle of its object may be, and how likely it is there.
 
 That a pattern repeats says nothing about where its objects are: every shift repeats as well. What does
 is looked at in the common cell of the pattern (p3i.vision.motif): half-turn symmetry, a middle that
@@ -6,8 +6,11 @@ differs from a plain border, parts that end within the cell, texture and change 
 at one place. At the pattern's rim there is one more witness: true objects are whole there, whereas cells
 of a wrong phase hold halves. The weights with which these speak come from a conditional logit over
 photographs of many kinds; where thin lines cross on a plain ground, they take the crossing, not the hole
-between the lines, for the object (a Go board and a fence, but alas also the ruled cells of a sudoku).
+between the lines, for the object (a Go board and a fence, but alas also the ruled cells of a sudoku). What
+"the object" is there is a matter of taste, so the other places are told too, each by the name that it has.
 """
+
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -16,7 +19,7 @@ from numpy.typing import NDArray
 from p3i.search.extent.alike import look_alike, working_size
 from p3i.vision.alike import Alike, between
 from p3i.vision.cells import cut, lab, median_cell
-from p3i.vision.motif import concentration, contrast, offsets, parts, symmetry
+from p3i.vision.motif import concentration, contrast, named_places, offsets, parts, symmetry
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -25,20 +28,33 @@ Mask = NDArray[np.bool_]
 WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
 """How much each cue of phase_cues speaks."""
 _STEP = 2  # samples between the phases that the rim is asked about
-_LEAST_CHANCE = 0.003  # probability of another phase worth a look
-_NEAR = 0.13  # of a period: phases closer than this are the same answer
+_NEAR = 0.2  # of a period: phases closer than this are one place of the cell
+_MOST_PLACES = 6  # of a cell are told
 
 
-def find_phase(
+@dataclass(frozen=True, slots=True, eq=False)
+class Phase:
+    """A place of the cell that may be the middle of its object.
+
+    `origin` [2] is such a place on the plane, next to the middle of the pattern; `name` what is there
+    (p3i.vision.motif.named_places), None where that is not plain; `probability` that it is the object.
+    """
+
+    origin: Array
+    name: str | None
+    probability: float
+
+
+def find_phases(
     pixels: Floats,
     valid: Mask,
     image_from_plane: Array,
     basis: Array,
     support: NDArray | None = None,
-) -> Array | None:
-    """The middle of an object of a known lattice, near the middle of the pattern: a plane point [2].
+) -> list[Phase]:
+    """The places of a known lattice's cell that may be its object, the likeliest first.
 
-    None where no cell of it shows.
+    Empty where no cell shows.
 
     Convention: as in p3i.search.extent.presence.find_extent; the plane may have any origin.
     """
@@ -47,9 +63,11 @@ def find_phase(
         support = cv2.resize(np.asarray(support, np.float32), mask.shape[::-1], interpolation=cv2.INTER_AREA)
     alike = look_alike(small, mask, matrix, basis, _middle(mask, matrix), support)
     if alike is None or alike.level <= 0 or not (alike.weights > 0).any():
-        return None
-    worth = sum(WEIGHTS[name] * cue for name, cue in phase_cues(alike).items())
-    return _phase(alike, basis, _middle(mask, matrix), np.asarray(worth))
+        return []
+    cell = common_cell(alike)
+    worth = sum(WEIGHTS[name] * cue for name, cue in phase_cues(alike, cell).items())
+    names = named_places(cell.colours[0])
+    return _phases(alike, basis, _middle(mask, matrix), np.asarray(worth), names)
 
 
 def _middle(mask: Mask, image_from_plane: Array) -> Array:
@@ -62,23 +80,44 @@ def _middle(mask: Mask, image_from_plane: Array) -> Array:
     return np.zeros(2)
 
 
-def phase_cues(alike: Alike) -> dict[str, Array]:
-    """What each witness says about an object's middle at each sample of the cell: arrays [side, side]."""
-    side, box = alike.sheet.side, alike.sheet.box
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonCell:
+    """The common cell as it looks: `colours` [3, side, side] (median Lab), `appearance` [4, side, side].
+
+    `cells` [N, 3, side, side] are the colours of each cell that it is taken from, known where `seen`.
+    """
+
+    colours: Floats
+    appearance: Floats
+    cells: Floats
+    seen: Mask
+
+
+def common_cell(alike: Alike) -> CommonCell:
+    """The median cell of those that are surely of the pattern."""
+    side = alike.sheet.side
     colours, seen = cut(lab(alike.sheet.values), side), cut(alike.sheet.seen, side)
-    typical = alike.weights > 0.3 if (alike.weights > 0.3).any() else alike.weights > 0
-    median, _ = median_cell(colours, seen, np.flatnonzero(typical))
+    median, _ = median_cell(colours, seen, np.flatnonzero(_typical(alike)))
+    return CommonCell(median, _appearance(alike, median), colours, seen)
+
+
+def _typical(alike: Alike) -> Mask:
+    return alike.weights > 0.3 if (alike.weights > 0.3).any() else alike.weights > 0
+
+
+def phase_cues(alike: Alike, cell: CommonCell) -> dict[str, Array]:
+    """What each witness says about an object's middle at each sample of the cell: arrays [side, side]."""
+    box, typical = alike.sheet.box, _typical(alike)
     inside = typical | between(typical.reshape(box.rows, box.columns)).ravel()
     region = np.flatnonzero(inside & (alike.visible > 0.9))
     if len(region) < 3:
         region = np.flatnonzero(typical)
-    appearance = _appearance(alike, median)
     return {
         "symmetry": symmetry(alike.template),
-        "contrast": contrast(median if alike.colour_share > 0.1 else appearance),
-        "parts": parts(appearance),
+        "contrast": contrast(cell.colours if alike.colour_share > 0.1 else cell.appearance),
+        "parts": parts(cell.appearance),
         "texture": concentration((alike.template**2).sum(axis=0)),
-        "change": concentration(_change(colours[region], seen[region], median)),
+        "change": concentration(_change(cell.cells[region], cell.seen[region], cell.colours)),
         "whole": _whole(alike),
     }
 
@@ -147,30 +186,52 @@ def _whole(alike: Alike) -> Array:
     return result
 
 
-def _phase(alike: Alike, basis: Array, origin: Array, worth: Array) -> Array:
-    """The most probable phase by worth [side, side], as a plane point next to the middle of the pattern."""
+def _phases(
+    alike: Alike, basis: Array, origin: Array, worth: Array, names: dict[str, tuple[int, int]]
+) -> list[Phase]:
+    """The tops of worth [side, side], each with the probability of what lies nearest to it, as plane points.
+
+    `names` says at which sample (row, column) what lies.
+    """
     n, box = alike.sheet.side, alike.sheet.box
     odds = np.exp(worth - worth.max())
     odds /= odds.sum()
     i, j = np.meshgrid(np.arange(box.i_start, box.i_stop), np.arange(box.j_start, box.j_stop))
     weight = alike.weights / max(float(alike.weights.sum()), 1e-9)
     middle = np.round([float((i.ravel() * weight).sum()), float((j.ravel() * weight).sum())])
-    x, y = offsets(n)
-    found: list[tuple[Array, float]] = []
-    left = odds.copy()
-    for _ in range(4):
-        row, column = divmod(int(left.argmax()), n)
-        close = np.maximum(
-            np.abs(np.roll(x, (row, column), (0, 1))), np.abs(np.roll(y, (row, column), (0, 1)))
-        ) <= _NEAR  # fmt: skip
-        mass = float(left[close].sum())
-        if found and mass < _LEAST_CHANCE:
-            break
+    tops = _tops(worth)
+    away = np.stack([_away(n, top) for top in tops])
+    nearest = away.argmin(axis=0)
+    found = []
+    for place, (row, column) in enumerate(tops):
         step = np.array([_peak(worth[row], column), _peak(worth[:, column], row)])
         cell = (np.array([column, row]) + step + 0.5) / n - 0.5
-        found.append((origin + (middle + cell) @ basis, mass))
-        left[close] = 0
-    return max(found, key=lambda phase: phase[1])[0]
+        near = [name for name, at in names.items() if away[place][at] < _NEAR and nearest[at] == place]
+        mass = float(odds[nearest == place].sum())
+        found.append(Phase(origin + (middle + cell) @ basis, near[0] if near else None, mass))
+    return sorted(found, key=lambda phase: -phase.probability)
+
+
+def _tops(worth: Array) -> list[tuple[int, int]]:
+    """The highest samples (row, column) of worth [side, side] on the torus, none near a higher one."""
+    n = len(worth)
+    around = np.max([np.roll(worth, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)], axis=0)
+    at = [divmod(int(k), n) for k in np.argsort(-worth, axis=None, kind="stable")]
+    tops: list[tuple[int, int]] = []
+    for row, column in at:
+        if worth[row, column] < around[row, column]:
+            continue
+        if all(_away(n, top)[row, column] > _NEAR for top in tops):
+            tops.append((row, column))
+        if len(tops) == _MOST_PLACES:
+            break
+    return tops
+
+
+def _away(n: int, place: tuple[int, int]) -> Array:
+    """How far each sample of a cell [n, n] lies from one (row, column), along u or v, in periods."""
+    x, y = offsets(n)
+    return np.maximum(np.abs(np.roll(x, place, (0, 1))), np.abs(np.roll(y, place, (0, 1))))
 
 
 def _peak(line: Array, at: int) -> float:

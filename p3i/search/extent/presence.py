@@ -5,6 +5,8 @@ what it costs to say is the answer (outline.py). What lies under a mask or is to
 unknown: to draw an object there costs a bit, as a claim that nobody can check.
 """
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -48,12 +50,16 @@ def find_extent(
     if not (found.whole > 0).any():
         return None
     grid = (box.rows, box.columns)
-    return best_outline(
+    outline = best_outline(
         np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid),
         halves=found.halves.reshape(4, *grid),
         i_start=box.i_start,
         j_start=box.j_start,
     )
+    if outline is None:
+        return None
+    seen = outline.holds(*box.indices.T) & found.judged
+    return replace(outline, there=int((found.whole[seen] > 0).sum()), seen=int(seen.sum()))
 
 
 def _middle_shows(image_from_cells: Array, box: Box, shape: tuple[int, int]) -> tuple[Mask, Mask]:

@@ -9,6 +9,7 @@ from p3i.grammar.ast import Program
 from p3i.interp.pattern import Pattern
 from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import mean_contrast, placed_right
+from p3i.search.result import Reading
 
 SUPPORT = 0.12
 """A cell belongs to a pattern where the others predict it this much better than at half steps; the same
@@ -69,10 +70,12 @@ class Drawn:
     """A fit of which it is known which objects are there: its `program`, and how sure it is, 0 to 1.
 
     `fit` is of the objects that are drawn. `sure` is what its score is made of (look/contrast.py); on rings
-    it may be told at another radius than the objects'. `notes` are for people.
+    it may be told at another radius than the objects'. `notes` are for people;
+    `readings` are the places of a lattice's cell that may be its object.
     """
 
     program: Program
     fit: Fit
     sure: float
     notes: tuple[str, ...] = ()
+    readings: tuple[Reading, ...] = ()

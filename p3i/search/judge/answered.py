@@ -32,7 +32,14 @@ def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
         score = score_of_program(look.evidence, drawn.program)
         return Answer(drawn.program, sketch.structure, score, drawn.fit.covered)
     if sketch.structure == "lattice":
-        return Answer(drawn.program, sketch.structure, drawn.sure, worth(drawn.fit), drawn.notes)
+        return Answer(
+            drawn.program,
+            sketch.structure,
+            drawn.sure,
+            worth(drawn.fit),
+            drawn.notes,
+            readings=drawn.readings,
+        )
     stated = drawn.fit.focal_mm == look.evidence.focal_mm
     answer = Answer(
         drawn.program,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from p3i.search.extent.phase import find_phase
+from p3i.search.extent.phase import find_phases
 
 CELLS = [(i, j) for i in range(7) for j in range(8)]
 
@@ -19,7 +19,8 @@ def phase_of(scene, shift=(0.0, 0.0), **changes):
         "basis": scene.basis,
         **changes,
     }
-    return find_phase(**given)
+    phases = find_phases(**given)
+    return phases[0].origin if phases else None
 
 
 def miss(scene, origin, shift=(0.0, 0.0)):

@@ -1,0 +1,107 @@
+"""Which place of the cell is the object: an answer's other readings as answers, and what is said of them.
+
+The same lattice may have its objects where lines cross or on the fields between, on the dark squares of a
+floor or on the light ones. The likeliest is drawn; the others are told, and `--object` picks one of them.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from p3i.grammar.ast import Affine
+from p3i.interp.compile import compile
+from p3i.interp.unroll import nest
+from p3i.search.answer import Answer
+from p3i.search.config import SearchConfig
+from p3i.search.extent.layout import filling_layout, layout_at, refitted
+from p3i.search.forms.lattice import Lattice
+from p3i.search.judge.bits import explained_bits
+from p3i.search.judge.evaluate import score_of_program
+from p3i.search.look.session import Session
+from p3i.search.result import Reading
+
+# An answer whose reading is less probable than this says so, and names the others of at least that.
+_SURE = 0.8
+_WORTH_NAMING = 0.05
+
+
+def offers(answer: Answer, config: SearchConfig) -> bool:
+    """Whether an answer draws the place of the cell that the options ask for; a ring has no such choice."""
+    return config.object is None or not answer.readings or _is(_drawn(answer), config.object, answer)
+
+
+def reading_notes(answer: Answer, config: SearchConfig) -> tuple[str, ...]:
+    """What to say of the place that an answer's objects are on."""
+    if config.object is not None:
+        chooses = "--object chooses among the places of a lattice's cell, and this is a"
+        return () if answer.readings else (f"{chooses} {_KINDS.get(answer.structure, answer.structure)}",)
+    reading = _drawn(answer)
+    if reading is None or reading.probability >= _SURE:
+        return ()
+    others = [one for one in answer.readings if one is not reading and one.probability >= _WORTH_NAMING]
+    told = ", ".join(f"--object {one.name} draws on {one.phrase} ({one.probability:.2f})" for one in others)
+    drawn = (
+        f"what of the cell is its object is not sure: drawn on {reading.phrase} ({reading.probability:.2f})"
+    )
+    return (f"{drawn}; {told}" if told else drawn,)
+
+
+def other_readings(session: Session, answer: Answer, *, most: int) -> list[Answer]:
+    """The same lattice with its objects on other places of its cell, the likeliest first, at most so many.
+
+    None for an answer through a lens, whose lattice is one of another picture.
+    """
+    found: list[Answer] = []
+    for one in _others(session, answer) if answer.lens_k1 is None else ():
+        if len(found) >= most:
+            break
+        found.append(one)
+    return found
+
+
+def _others(session: Session, answer: Answer) -> Iterator[Answer]:
+    config = session.config
+    evidence = session.evidence.under(answer.focal_mm or session.evidence.focal_mm)
+    ground = compile(answer.program).index
+    for reading in answer.readings:
+        if reading.drawn:
+            continue
+        lattice = _lattice(answer).moved_to(np.array(reading.steps))
+        layout = layout_at(evidence, lattice, ground, readings=_seen_from(reading, answer.readings))
+        if layout is None:
+            continue
+        layout = refitted(evidence, layout)
+        if config.extent_used == "image":
+            layout = filling_layout(evidence, layout)
+        other = replace(answer, program=layout.program(), readings=layout.readings, notes=())
+        score = score_of_program(evidence, other.program)
+        yield replace(other, score=score, worth=explained_bits(session.evidence, other))
+
+
+def _lattice(answer: Answer) -> Lattice:
+    """The camera and the lattice that a lattice's program draws."""
+    parts = nest(answer.program)
+    x, y = parts.draw.x, parts.draw.y
+    assert isinstance(x, Affine) and isinstance(y, Affine)
+    basis = np.array([[x.i, y.i], [x.j, y.j]])
+    camera = answer.program.camera
+    return Lattice(camera.rx_deg, camera.ry_deg, basis, np.array([x.constant, y.constant]))
+
+
+def _seen_from(drawn: Reading, readings: tuple[Reading, ...]) -> tuple[Reading, ...]:
+    """The readings as they are told where one of them is drawn."""
+    i, j = drawn.steps
+    return tuple(replace(one, steps=(one.steps[0] - i, one.steps[1] - j)) for one in readings)
+
+
+def _drawn(answer: Answer) -> Reading | None:
+    return next((one for one in answer.readings if one.drawn), None)
+
+
+def _is(reading: Reading | None, asked: str, answer: Answer) -> bool:
+    """Whether a reading is the one that was asked for, by its name or its rank."""
+    return reading is not None and asked in (reading.name, str(answer.readings.index(reading) + 1))
+
+
+_KINDS = {"circular": "ring", "hybrid": "pattern of rings"}
