@@ -152,21 +152,25 @@ def _best_of(session: Session, pattern: Pattern, readings: list[tuple[Tensor, Te
     """Of one ground's cells (theta [P], index [N, 2]), finished each, the program with the best score."""
     best: Answer | None = None
     for theta, ground in readings:
-        layout = found_layout(session.evidence, Lattice.of(pattern, theta), ground)
-        if layout is None:
+        found = found_layout(session.evidence, Lattice.of(pattern, theta), ground)
+        if found is None:
             continue
-        answer = _answer(session, pattern, refitted(session.evidence, pattern, layout))
+        layout, note = found
+        answer = _answer(session, pattern, refitted(session.evidence, pattern, layout), note)
         if answer is not None and (best is None or answer.score > best.score):
             best = answer
     return best
 
 
-def _answer(session: Session, pattern: Pattern, layout: Layout) -> Answer | None:
-    """The program of a layout with its score, under the options that change what is drawn."""
-    notes: tuple[str, ...] = ()
+def _answer(session: Session, pattern: Pattern, layout: Layout, note: str) -> Answer | None:
+    """The program of a layout with its score and note, under the options that change what is drawn."""
+    notes: tuple[str, ...] = (note,) if note else ()
     if session.config.strict:
         free, (layout, moved) = layout, strict_layout(layout)
-        notes = (_strict_note(free, layout, moved * session.evidence.image.size.unit_px),)
+        notes = (
+            *notes,
+            _strict_note(free, layout, moved * session.evidence.image.size.unit_px),
+        )
     measured = layout_fit(session.evidence, layout)
     if measured is None:
         return None

@@ -45,8 +45,8 @@ class SuperCell:
 def supercell(basis: np.ndarray) -> SuperCell:
     """The rectangle of fewest cells; where none is rectangular, the nearest to it of up to four cells.
 
-    A basis that could be much shorter is one that somebody chose: there the rectangle stands on its longer step,
-    the row (of bricks, or along the fields of a chessboard).
+    A basis that could be much shorter is one that somebody chose: there the rectangle stands on its longer
+    step, the row (of bricks, or along the fields of a chessboard).
 
     `basis` [2, 2] has rows u and v, not parallel.
     """
@@ -67,7 +67,7 @@ def supercell(basis: np.ndarray) -> SuperCell:
 
 
 def _row(basis: np.ndarray) -> int | None:
-    """Which step of a basis is the row that it was chosen for, None where the steps are nearly the shortest."""
+    """Which step of a basis is the row that it was chosen for, None where there are hardly shorter ones."""
     squared = np.square(basis).sum(axis=1)
     chosen = 2 * abs(float(basis[0] @ basis[1])) > _CHOSEN * float(squared.min())
     return int(squared.argmax()) if chosen else None

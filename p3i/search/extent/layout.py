@@ -1,27 +1,26 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 import torch
 from torch import Tensor
 
-from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.extent.phase import find_phase
-from p3i.search.extent.presence import find_extent
+from p3i.search.extent.presence import cells_that_hold
+from p3i.search.extent.rows import in_rows
 from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
 from p3i.search.fit.robust import fit_instances
-from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
+from p3i.search.forms.layout import Layout
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
 from p3i.search.look.correlate import find_instances
-from p3i.search.look.evidence import Evidence, Level
+from p3i.search.look.edges import edge_directions
+from p3i.search.look.evidence import Evidence
 from p3i.search.look.thinned import thinned
 from p3i.vision.warp import in_frame
 
@@ -34,54 +33,10 @@ _FEWEST_REFITTED = 6
 _REFITS = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Layout:
-    """A lattice with its objects: half-open index ranges and guards (a, b, c) for a*i + b*j >= c."""
+def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[Layout, str] | None:
+    """The objects of a lattice whose cells `ground` [N, 2] are sure: phase, extent and rows from the photo.
 
-    lattice: Lattice
-    i_range: tuple[int, int]
-    j_range: tuple[int, int]
-    guards: tuple[tuple[int, int, int], ...] = ()
-
-    def holds(self, index: np.ndarray) -> np.ndarray:
-        """Which rows of `index` [N, 2] the layout draws."""
-        i, j = index[:, 0], index[:, 1]
-        inside = (
-            (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
-        )
-        for a, b, c in self.guards:
-            inside &= a * i + b * j >= c
-        return inside
-
-    def program(self, *, from_zero: bool = True) -> Program:
-        """The program, with both loops starting at 0, or else at the first index of each range.
-
-        Where the origin is 0, the latter needs no constants in `Draw` and guards, of which Table 1 has none.
-        """
-        (i0, i1), (j0, j1) = self.i_range, self.j_range
-        i_start, j_start = (0, 0) if from_zero else (i0, j0)
-        i_skip, j_skip = i0 - i_start, j0 - j_start
-        u, v = self.lattice.basis
-        origin = self.lattice.origin + i_skip * u + j_skip * v
-
-        def length(value: float) -> float:
-            return round(float(value), LENGTH_DIGITS)
-
-        body: Draw | If = Draw(
-            Affine(length(u[0]), length(v[0]), length(origin[0])),
-            Affine(length(u[1]), length(v[1]), length(origin[1])),
-        )
-        for a, b, c in reversed(self.guards):
-            body = If(Affine(a, b, a * i_skip + b * j_skip - c), body)
-        inner = For("j", Affine(constant=j_start), Affine(constant=j1 - j_skip), body)
-        pose = CameraPose(round(self.lattice.rx_deg, ANGLE_DIGITS), round(self.lattice.ry_deg, ANGLE_DIGITS))
-        return Program(pose, For("i", Affine(constant=i_start), Affine(constant=i1 - i_skip), inner))
-
-
-def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:
-    """The objects of a lattice whose cells `ground` [N, 2] are sure: phase and extent from the photo.
-
-    None where no object is seen.
+    With a note on other rows that are as natural, else "". None where no object is seen.
     """
     image = evidence.image
     matrix = image_from_plane(
@@ -92,10 +47,12 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
     if origin is None:
         return None
     lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, origin)
-    found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
-    if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
+    cells = cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
+    edges = edge_directions(image.pixels, matrix, support & image.valid)
+    found = None if cells is None else in_rows(cells, lattice, edges=edges, unit_px=image.size.unit_px)
+    if found is None or min(np.diff(found[0].i_range)[0], np.diff(found[0].j_range)[0]) < 2:
         return None  # one row fixes no plane
-    return Layout(lattice, found.i_range, found.j_range, found.guards)
+    return found
 
 
 def filling_layout(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
@@ -146,27 +103,23 @@ def layout_fit(evidence: Evidence, layout: Layout) -> Fit | None:
     if not found:
         return None
     best = max(found, key=lambda one: score_of(one.contrast))
-    return weighed(best.level, drawn, drawn.theta, best.index, best.contrast)
-
-
-def _drawn_cells(
-    level: Level, pattern: Pattern, layout: Layout, theta: Tensor, *, cut: bool | None = None
-) -> Tensor:
-    """The cells in view that a layout draws, [N, 2]; `cut` as in `cells_in_view`."""
-    index = cells_in_view(level, pattern, theta, most=4000, cut=cut)
-    return index[torch.from_numpy(layout.holds(index.numpy()))]
+    return weighed(best.level, best.pattern, best.pattern.theta, best.index, best.contrast)
 
 
 def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     """The layout with camera and lattice fitted once more, to its own objects only and on the fine map.
 
     What the fit grew on had cells cut anywhere and some beyond the pattern; now each cell holds an object.
-    Objects at the frame count too: they lie farthest apart, and that fixes the pose.
+    Objects at the frame count too: they lie farthest apart, and that fixes the pose. Cells are those of the
+    shortest steps, which are the most compact.
     """
-    theta = layout.lattice.theta(pattern)
+    shortest = layout.lattice.reduced()
+    change = np.round(shortest.basis @ np.linalg.inv(layout.lattice.basis))
+    theta = shortest.theta(pattern)
     side = side_of_middle(evidence, pattern, layout)
     level = evidence.level_for(_SHARPER * side, finest=True)
-    index = _drawn_cells(level, pattern, layout, theta, cut=True)
+    index = cells_in_view(level, pattern, theta, most=4000, cut=True)
+    index = index[torch.from_numpy(layout.holds(np.round(index.numpy() @ change)))]
     if len(index) < _FEWEST_REFITTED:
         return layout
     index = index[thinned(index, _MOST_REFITTED)]
@@ -179,7 +132,9 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
         theta = fit_instances(level, pattern, theta, found, weights=weights.double())
     if not sane(pattern, theta):
         return layout
-    return Layout(Lattice.of(pattern, theta), layout.i_range, layout.j_range, layout.guards)
+    found = Lattice.of(pattern, theta)
+    written = found.with_basis(np.round(np.linalg.inv(change)) @ found.basis)
+    return Layout(written, layout.i_range, layout.j_range, layout.guards)
 
 
 def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> float:

@@ -22,10 +22,13 @@ DIRECTIONS = tuple(
 )
 """Normals of guards; those along i or j alone are what the ranges are for."""
 
-_GUARD_COST = 4.0  # nats to say that there is one more guard, and its threshold
+GUARD_COST = 4.0
+"""Nats to say that there is one more guard, and its threshold."""
+
 _SLOPE_COST = 1.0  # nats for each unit of |a| + |b| beyond 2
 _MOST_GUARDS = 3
 _ROUNDS = 6
+_MOST_CELLS = 200_000  # of a table that other steps shear
 _IDLE = 1e-3  # what a cell without evidence costs, so that outlines do not reach out for nothing
 
 
@@ -46,6 +49,46 @@ class Outline:
         for a, b, c in self.guards:
             inside &= a * i + b * j >= c
         return inside
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """What is known of a lattice's cells: log-odds [J, I] in nats, of (i, j) from `first` on."""
+
+    odds: Array
+    first: tuple[int, int]
+
+    def changed(self, change: NDArray[np.int64]) -> "Cells | None":
+        """The same cells under the steps `change` [2, 2], whole rows in terms of the present ones.
+
+        None where the table would be too large.
+        """
+        j, i = np.nonzero(self.odds)
+        index = (np.stack([i, j], 1) + self.first) @ np.round(np.linalg.inv(change)).astype(int)
+        if len(index) == 0:
+            return self
+        low, high = index.min(0), index.max(0) + 1
+        if (high - low).prod() > _MOST_CELLS:
+            return None
+        odds = np.zeros((high - low)[::-1])
+        odds[tuple((index - low).T[::-1])] = self.odds[j, i]
+        return Cells(odds, (int(low[0]), int(low[1])))
+
+    def outline(self) -> Outline | None:
+        """What of the cells is drawn; None where nothing speaks for any."""
+        return best_outline(self.odds, i_start=self.first[0], j_start=self.first[1])
+
+    def unseen(self, outline: Outline) -> int:
+        """How many cells an outline holds of which nothing is known."""
+        box = [np.arange(*ends) for ends in (outline.i_range, outline.j_range)]
+        held = outline.holds(*np.meshgrid(*box))
+        j, i = np.nonzero(self.odds)
+        return int(held.sum()) - int(outline.holds(i + self.first[0], j + self.first[1]).sum())
+
+    @property
+    def most(self) -> float:
+        """The log-odds that the best outline could hold at most."""
+        return float(np.maximum(self.odds, 0).sum())
 
 
 def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outline | None:
@@ -110,7 +153,7 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 
 def _cost(guards: tuple[tuple[int, int, int], ...]) -> float:
-    return sum(_GUARD_COST + _SLOPE_COST * (abs(a) + abs(b) - 2) for a, b, _ in guards)
+    return sum(GUARD_COST + _SLOPE_COST * (abs(a) + abs(b) - 2) for a, b, _ in guards)
 
 
 def _inside(i: Array, j: Array, box: tuple[int, int, int, int] | None, guards: tuple) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.search.extent.alike import Alike, Kind, look_alike, working_size
-from p3i.search.extent.outline import Outline, best_outline, rectangle_gain
+from p3i.search.extent.outline import Cells, rectangle_gain
 from p3i.vision.cells import agreement, shifted
 from p3i.vision.sheet import cell_sides_px, project
 
@@ -28,15 +28,15 @@ _LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
 
 
-def find_extent(
+def cells_that_hold(
     pixels: Floats,
     valid: Mask,
     image_from_plane: Array,
     basis: Array,
     origin: Array,
     support: NDArray | None = None,
-) -> Outline | None:
-    """The outline of the cells of a lattice that hold an object in a photo; None where none is seen to.
+) -> Cells | None:
+    """How surely each cell of a lattice holds an object in a photo; None where none is seen to.
 
     Convention: pixels [H, W, 3] RGB in 0..1, valid [H, W]; `image_from_plane` 3x3 maps plane points in front
     of the camera to positive third coordinates; basis [2, 2] has rows u, v and origin [2] is the middle of an
@@ -50,8 +50,7 @@ def find_extent(
         return None
     evidence = _evidence(alike, mask.shape)
     box = alike.sheet.box
-    grid = evidence.reshape(box.rows, box.columns)
-    return best_outline(grid, i_start=box.i_start, j_start=box.j_start)
+    return Cells(evidence.reshape(box.rows, box.columns), (box.i_start, box.j_start))
 
 
 def _indices(alike: Alike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

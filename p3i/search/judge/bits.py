@@ -31,6 +31,8 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern, without_doubles
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
+from p3i.search.fit.judged import sweeps_cells
+from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import SIDE, frames, patch_contrast, sample_px, spacing
@@ -109,6 +111,8 @@ def explained_bits(evidence: Evidence, answer: Answer) -> float:
 def explained(evidence: Evidence, answer: Answer) -> Explained:
     """What a program explains of the photo, object by object; nothing where fewer than two are in sight."""
     pattern = without_doubles(compile(answer.program))
+    if sweeps_cells(pattern):
+        pattern = in_shortest_steps(pattern)
     focal_mm = answer.focal_mm or evidence.focal_mm
     in_sight = evidence.in_sight(pattern, focal_mm=focal_mm)
     index = pattern.index[in_sight].double()

@@ -135,8 +135,9 @@ def test_the_layout_of_the_truth_is_the_truth(seed: int) -> None:
     scene = small_scene(seed)
     ground = torch.from_numpy(scene.index).double()
     off = lattice_of(scene.program).moved_to(np.array([0.3, -0.2]))
-    layout = found_layout(evidence_of(scene), off, ground)
-    assert layout is not None
+    found = found_layout(evidence_of(scene), off, ground)
+    assert found is not None
+    layout, _ = found
     drawn = np.array([(x, y) for x, y, _, _ in points(layout.program())])
     seen, _ = project(scene.camera.image_from_plane(scene.size), torch.from_numpy(drawn))
     apart = np.linalg.norm(scene.centers_px[:, None] - seen.numpy()[None], axis=2)

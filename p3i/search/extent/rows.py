@@ -1,0 +1,184 @@
+"""Which steps the program of a lattice takes: those that a person would choose, told by bits.
+
+A lattice has many bases, and every one draws the same points. The shortest is the diagonal of bricks and of
+the fields of a chessboard; a person takes the rows. What speaks for a basis, in bits:
+
+- the objects that its ranges and guards hold, by the evidence of the cells, less what these cost to say and
+  a little for each object that nobody sees;
+- the lines of the pattern, if rows run along them: told the direction, they need not be told one by one;
+- a term that is nothing, a right angle, or rows that are shifted by half a step each: one number less;
+- and against it, that its steps are longer than they need be.
+
+Convention: `change` [2, 2] whole, its rows the new steps in terms of the old, so that (i, j) becomes
+(i, j) @ inverse(change); a basis [2, 2] has the steps as rows, in program units.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.search.extent.outline import GUARD_COST, Cells, rectangle_gain
+from p3i.search.forms.lattice import Lattice
+from p3i.search.forms.layout import Layout
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+# Rows that are looked at, in steps of the shortest basis: bricks four times as wide as high need (1, 2).
+_ROWS = ((1, 0), (0, 1), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
+# A cell's lines count as so many independent samples (as a patch does in judge/bits.py). They run along a
+# direction within so many degrees of it, which by chance is that share of them along two.
+_SAMPLES = 50
+_ALONG_DEG = 8
+_BY_CHANCE = 2 * (2 * _ALONG_DEG + 1) / 180
+# Angles are right, and rows shifted by half, to within this share; a guessed focal skews by so many degrees.
+_RIGHT = math.sin(math.radians(2.0))
+_SKEWED_DEG = 15
+# A term of a step that moves no object by so many pixels is none.
+_NOTHING_PX = 0.3
+# What one number less saves (as in judge/bits.py), and what an object costs that lies out of sight.
+_NUMBER_BITS = 11.0
+_UNSEEN_BITS = 0.25
+# Bases within so many bits are as natural as each other.
+_TIE_BITS = 0.5
+
+
+def in_rows(cells: Cells, lattice: Lattice, *, edges: Array, unit_px: float) -> tuple[Layout, str] | None:
+    """The lattice's objects in the steps that most bits speak for, and what to say of others as natural.
+
+    `edges` [180] as `look/edges.py` tells them of the plane, `unit_px` a program unit in pixels. The
+    lattice's own steps stay where no others are better. None where no cell is seen to hold an object.
+    """
+    found: list[tuple[float, Layout]] = []
+    for change in bases_with_rows(lattice.basis):
+        turned = cells.changed(change)
+        if turned is None:
+            continue
+        written = lattice.with_basis(change @ lattice.basis)
+        speaks = _for_steps(written.basis, edges)
+        if found:  # where ranges alone do worse, it takes a guard
+            held = max(rectangle_gain(turned.odds), turned.most - GUARD_COST) / math.log(2)
+            best = max(bits for bits, _ in found)
+            if held + speaks + 2 * _NUMBER_BITS < best - _TIE_BITS:
+                continue
+        outline = turned.outline()
+        if outline is None:
+            continue
+        layout = Layout(written, outline.i_range, outline.j_range, outline.guards)
+        unseen = turned.unseen(outline)
+        speaks += _NUMBER_BITS * _terms_that_are_nothing(layout, unit_px) - _UNSEEN_BITS * unseen
+        found.append((outline.gain / math.log(2) + speaks, layout))
+    if not found:
+        return None
+    best = max(bits for bits, _ in found)
+    equal = [layout for bits, layout in found if bits > best - _TIE_BITS]
+    # Of equals the one that stands upright, and of these the first.
+    chosen = min(equal, key=lambda layout: round(_lean_deg(layout.lattice.basis)))
+    others = [layout.lattice.basis for layout in equal if layout is not chosen]
+    return chosen, _note([basis for basis in others if not _same_rows(basis, chosen.lattice.basis)])
+
+
+def bases_with_rows(basis: Array) -> list[Whole]:
+    """The changes to the bases that are looked at: none, then each row with the shortest step to the next."""
+    found = [np.eye(2, dtype=int)]
+    for row in _ROWS:
+        along = np.array(row) @ basis
+        across = np.array((0, 1) if abs(row[0]) == 1 else (1, 0))
+        back = float(across @ basis @ along) / float(along @ along)
+        for times in {math.floor(back), math.ceil(back)}:
+            if abs(back - times) > 0.5 + _RIGHT:
+                continue
+            change = _in_order(np.array([row, across - times * np.array(row)]), basis)
+            if not any(_same_steps(change, other) for other in found):
+                found.append(change)
+    return found
+
+
+def _in_order(change: Whole, basis: Array) -> Whole:
+    """The steps ordered and turned as `forms/lattice.reduce_basis` does: u to the right, v down from it."""
+    u, v = change @ basis
+    if abs(u[0]) * np.linalg.norm(v) < abs(v[0]) * np.linalg.norm(u):
+        change, (u, v) = change[::-1], (v, u)
+    signs = np.array([1 if u[0] >= 0 else -1, 1])
+    signs[1] = 1 if signs[0] * (u[0] * v[1] - u[1] * v[0]) > 0 else -1
+    return change * signs[:, None]
+
+
+def _same_steps(change: Whole, other: Whole) -> bool:
+    """Whether two changes name the same two steps, in any order and direction."""
+    return {frozenset((tuple(step), tuple(-step))) for step in change} == {
+        frozenset((tuple(step), tuple(-step))) for step in other
+    }
+
+
+def _for_steps(basis: Array, edges: Array) -> float:
+    """What speaks for the steps of a basis whatever objects are drawn, in bits."""
+    lengths = np.linalg.norm(basis, axis=1)
+    skew = float(basis[0] @ basis[1])
+    area = abs(float(np.linalg.det(basis)))
+    bits = -2 * math.log2(lengths.prod() / area)
+    if abs(skew) < _RIGHT * lengths.prod() or (np.abs(2 * abs(skew) / lengths**2 - 1) < 2 * _RIGHT).any():
+        bits += _NUMBER_BITS
+    rows = [
+        _along_lines(basis[k], basis[1 - k], edges)
+        for k in (0, 1)
+        if abs(skew) <= (0.5 + _RIGHT) * lengths[k] ** 2
+    ]
+    return bits + max(rows, default=0.0)
+
+
+def _along_lines(row: Array, step: Array, edges: Array) -> float:
+    """What is saved of a cell's lines where they run along a row, or across it, in bits.
+
+    Across is where the rows after the next lie, if that is about a right angle on a plane of a guessed focal.
+    """
+    turn = _angle_deg(row)
+    off = [(_angle_deg(step + times * row / 2) - turn) % 180 for times in (-2, -1, 0, 1, 2)]
+    nearest = min(off, key=lambda angle: abs(angle - 90))
+    across = nearest if abs(nearest - 90) < _SKEWED_DEG else 90
+    along_row, along_step = (_share(edges, turn + angle) for angle in (0, across))
+    both = along_row + along_step
+    if both <= _BY_CHANCE:
+        return 0.0
+    told = both * math.log2(both / _BY_CHANCE)
+    told += (1 - both) * math.log2((1 - both) / (1 - _BY_CHANCE)) if both < 1 else 0
+    lead = along_row / both
+    if both > 0.5 and lead > 0.5:  # most lines run this way: they are its rows
+        told += both * (1 + lead * math.log2(lead) + ((1 - lead) * math.log2(1 - lead) if lead < 1 else 0))
+    return _SAMPLES * told
+
+
+def _share(edges: Array, angle_deg: float) -> float:
+    """The share of the edges within a few degrees of a direction."""
+    near = (math.floor(angle_deg) + np.arange(-_ALONG_DEG, _ALONG_DEG + 1)) % 180
+    return float(edges[near].sum())
+
+
+def _terms_that_are_nothing(layout: Layout, unit_px: float) -> int:
+    """How many numbers of the steps move no object that is drawn."""
+    counts = np.array([stop - start for start, stop in (layout.i_range, layout.j_range)])
+    return int((np.abs(layout.lattice.basis) * (counts[:, None] - 1) / 2 * unit_px < _NOTHING_PX).sum())
+
+
+def _angle_deg(step: Array) -> float:
+    return math.degrees(math.atan2(step[1], step[0]))
+
+
+def _lean_deg(basis: Array) -> float:
+    """How far the more upright step of a basis is from standing upright, or lying level."""
+    return min(abs(math.remainder(_angle_deg(step), 90.0)) for step in basis)
+
+
+def _same_rows(basis: Array, other: Array) -> bool:
+    """Whether the longer steps of two bases lie on one line: then only where rows begin is told otherwise."""
+    rows = [max(one, key=lambda step: float(step @ step)) for one in (basis, other)]
+    return abs(math.remainder(_angle_deg(rows[0]) - _angle_deg(rows[1]), 180.0)) < 1.0
+
+
+def _note(others: list[Array]) -> str:
+    """What to say of bases that are as natural as the one that was taken; nothing where there are none."""
+    if not others:
+        return ""
+    told = ", or ".join(" and ".join(f"({x:.2f}, {y:.2f})" for x, y in basis) for basis in others)
+    return f"other rows tell this lattice as shortly: with steps of {told}"
