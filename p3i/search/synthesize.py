@@ -22,6 +22,7 @@ from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.lens import find_with_lens
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
+from p3i.search.optics.printed import as_precise_as_fitted
 from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
 from p3i.search.result import (
     FOCAL_REASONS,
@@ -88,10 +89,11 @@ def _result(
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(session, answers)
-    told = with_printed_scores(session.evidence, answers, needed=needed)
-    sure = convincing(answers, told, needed=needed, fills=config.extent_used == "image")
     # What a person asked for is theirs to choose, whatever it costs.
     asked = asked_for(config) is not None
+    written = answers if asked else [as_precise_as_fitted(session.evidence, answer) for answer in answers]
+    told = with_printed_scores(session.evidence, written, needed=needed)
+    sure = convincing(answers, told, needed=needed, fills=config.extent_used == "image")
     seen = sure if asked else [answer for answer in sure if _in_sight(session, answer)]
     good = seen if asked else [answer for answer in seen if answer.worth > 0]
     if not good:

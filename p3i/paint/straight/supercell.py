@@ -16,8 +16,8 @@ MOST = 4
 MOST_CELLS = 8
 """A rectangle of more cells than this is no texture that anyone would want."""
 
-_CHOSEN = 1.2
-"""A basis is the shortest up to 1 times this; a honeycomb's is at 1, give or take the fit's error."""
+_HALF = 0.1
+"""Rows that are shifted by half to within this share of a half."""
 
 TOLERANCE_DEG = 3.0
 """Sides that are this near to a right angle count as rectangular: an assumed focal skews by as much."""
@@ -45,12 +45,11 @@ class SuperCell:
 def supercell(basis: np.ndarray) -> SuperCell:
     """The rectangle of fewest cells; where none is rectangular, the nearest to it of up to four cells.
 
-    A basis that could be much shorter is one that somebody chose: there the rectangle stands on its longer
-    step, the row (of bricks, or along the fields of a chessboard).
+    Where rows are shifted by half, of bricks or along the fields of a chessboard, it stands on them.
 
     `basis` [2, 2] has rows u and v, not parallel.
     """
-    shortest, row = reduced(basis), _row(basis)
+    shortest, row = reduced(basis), row_of(basis)
     steps = [np.array(pair) @ shortest for pair in product(range(-MOST, MOST + 1), repeat=2) if any(pair)]
     vectors = [(pair, pair @ basis) for pair in steps if math.gcd(*pair.tolist()) == 1]
     for widest_deg in (45.0, 90.0):
@@ -66,11 +65,15 @@ def supercell(basis: np.ndarray) -> SuperCell:
     return min(found, key=lambda ranked: ranked[0])[1]
 
 
-def _row(basis: np.ndarray) -> int | None:
-    """Which step of a basis is the row that it was chosen for, None where there are hardly shorter ones."""
-    squared = np.square(basis).sum(axis=1)
-    chosen = 2 * abs(float(basis[0] @ basis[1])) > _CHOSEN * float(squared.min())
-    return int(squared.argmax()) if chosen else None
+def row_of(basis: np.ndarray) -> int | None:
+    """Which step of a basis is a row that the next is shifted against by half, as bricks are; or None.
+
+    Every step to the middle of the next row is one too, seen slantwise: the row is the straighter of the two.
+    """
+    leans = [abs(math.remainder(_angle_deg(step), 90.0)) for step in basis]
+    halves = np.abs(2 * np.abs(basis[0] @ basis[1]) / np.square(basis).sum(axis=1) - 1) < _HALF
+    k = int(leans[1] < leans[0])
+    return k if halves[k] and leans[k] < leans[1 - k] - 1 else None
 
 
 def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> SuperCell | None:

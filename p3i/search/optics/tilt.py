@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from p3i.grammar.ast import Program
 from p3i.interp.camera import project
 from p3i.search.answer import Answer
 from p3i.search.fit.features import step_limits
@@ -53,23 +54,32 @@ def pose_sigma_deg(evidence: Evidence, answer: Answer) -> float | None:
     """
     evidence = evidence.under(answer.focal_mm or evidence.focal_mm)
     evidence, program = without_lens(evidence, answer.program, answer.lens_k1)
-    focal_mm = evidence.focal_mm
+    # A lattice's own focal is that of its cell, taken as a square or another; its places do not tell it.
+    free_focal = answer.focal_mm is not None and answer.structure != "lattice"
+    known = covariance_of_program(evidence, program, free_focal=free_focal)
+    if known is None:
+        return None
+    # The camera's angles are the first of a program's numbers.
+    sigma_deg = sigma_of_normal_deg(known[:2, :2], rx_deg=program.camera.rx_deg)
+    return sigma_deg if math.isfinite(sigma_deg) else None
+
+
+def covariance_of_program(evidence: Evidence, program: Program, *, free_focal: bool = False) -> Tensor | None:
+    """The covariance [V, V] of a program's free numbers, as `whole_filling` has them, under evidence's focal.
+
+    With `free_focal` the logarithm of the focal is one more, the last. None where the photo shows fewer than
+    two objects.
+    """
     whole = whole_filling(program)
     if whole is None:
         return None
     filling, numbers = whole
     theta = filling.theta(numbers)
-    pattern = filling.pattern
+    pattern, focal_mm = filling.pattern, evidence.focal_mm
     index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
     if len(index) < 2:
         return None
-    # A lattice's own focal is that of its cell, taken as a square or another; its places do not tell it.
-    free_focal = answer.focal_mm is not None and answer.structure != "lattice"
-    covariance = _covariance(evidence, filling, numbers, index, focal_mm=focal_mm, free_focal=free_focal)
-    names = [unknown.name for unknown in filling.moving]
-    angles = [names.index(path) for path in ("camera.rx", "camera.ry")]
-    sigma_deg = sigma_of_normal_deg(covariance[angles][:, angles], rx_deg=float(numbers[angles[0]]))
-    return sigma_deg if math.isfinite(sigma_deg) else None
+    return _covariance(evidence, filling, numbers, index, focal_mm=focal_mm, free_focal=free_focal)
 
 
 def sigma_of_normal_deg(covariance: Tensor, *, rx_deg: float) -> float:

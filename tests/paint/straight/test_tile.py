@@ -84,8 +84,12 @@ def test_the_tile_of_a_honeycomb_stands_as_the_honeycomb_does(slip: float) -> No
 def test_the_tile_of_a_chessboard_stands_on_the_rows_that_its_program_has() -> None:
     rows = supercell(np.array([[10.0, 0.1], [5.0, 5.0]]))
     assert rows.steps.tolist() == [[1, 0], [-1, 2]] and rows.cells == 2
+    columns = supercell(np.array([[5.0, -5.0], [0.1, 10.0]]))
+    assert columns.steps.tolist() == [[2, 1], [0, 1]] and columns.cells == 2
     diagonals = supercell(np.array([[5.0, -5.0], [5.0, 5.0]]))
     assert diagonals.cells == 1
+    sheared = supercell(np.array([[5.0, 0.0], [5.0, 5.0]]))
+    assert sheared.cells == 1
 
 
 def test_a_lattice_without_a_rectangle_gets_the_nearest_and_says_how_skewed() -> None:
