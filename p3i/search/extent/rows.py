@@ -3,17 +3,17 @@
 A lattice has many bases, and every one draws the same points. The shortest is the diagonal of bricks and of
 the fields of a chessboard; a person takes the rows. What speaks for a basis, in bits:
 
-- the objects that its ranges and guards hold, by the evidence of the cells, less what these cost to say and
-  a little for each object that nobody sees;
+- the objects that its ranges and guards hold, by the evidence of the cells, less what these cost to say;
 - the lines of the pattern, if rows run along them: told the direction, they need not be told one by one;
-- a term that is nothing, a right angle, or rows that are shifted by half a step each: one number less;
-- and against it, that its steps are longer than they need be.
+- a term that is nothing: one number less;
+- right angles: steps that are no longer than they need be.
 
 Convention: `change` [2, 2] whole, its rows the new steps in terms of the old, so that (i, j) becomes
 (i, j) @ inverse(change); a basis [2, 2] has the steps as rows, in program units.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,16 +32,32 @@ _ROWS = ((1, 0), (0, 1), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 _SAMPLES = 50
 _ALONG_DEG = 8
 _BY_CHANCE = 2 * (2 * _ALONG_DEG + 1) / 180
-# Angles are right, and rows shifted by half, to within this share; a guessed focal skews by so many degrees.
-_RIGHT = math.sin(math.radians(2.0))
+# A step that leads to within this of halfway along the next row may be taken either way; a guessed focal
+# skews right angles by so many degrees.
+_HALF = 0.035
 _SKEWED_DEG = 15
 # A term of a step that moves no object by so many pixels is none.
 _NOTHING_PX = 0.3
-# What one number less saves (as in judge/bits.py), and what an object costs that lies out of sight.
+# What one number less saves (as in judge/bits.py).
 _NUMBER_BITS = 11.0
-_UNSEEN_BITS = 0.25
-# Bases within so many bits are as natural as each other.
+# Within so many bits others are no better, and within so many they are as good.
+_BETTER_BITS = 2.0
 _TIE_BITS = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Told:
+    """A layout, what speaks for it in bits, and how many objects it draws where nothing is seen."""
+
+    layout: Layout
+    bits: float
+    unseen: int
+
+    @property
+    def lean_deg(self) -> float:
+        """How far the straighter of its steps is from standing upright, or lying level."""
+        steps = self.layout.lattice.basis
+        return min(abs(math.remainder(_angle_deg(step), 90.0)) for step in steps)
 
 
 def in_rows(cells: Cells, lattice: Lattice, *, edges: Array, unit_px: float) -> tuple[Layout, str] | None:
@@ -50,33 +66,36 @@ def in_rows(cells: Cells, lattice: Lattice, *, edges: Array, unit_px: float) -> 
     `edges` [180] as `look/edges.py` tells them of the plane, `unit_px` a program unit in pixels. The
     lattice's own steps stay where no others are better. None where no cell is seen to hold an object.
     """
-    found: list[tuple[float, Layout]] = []
+    found: list[_Told] = []
+    best = -math.inf
     for change in bases_with_rows(lattice.basis):
         turned = cells.changed(change)
         if turned is None:
             continue
         written = lattice.with_basis(change @ lattice.basis)
         speaks = _for_steps(written.basis, edges)
-        if found:  # where ranges alone do worse, it takes a guard
-            held = max(rectangle_gain(turned.odds), turned.most - GUARD_COST) / math.log(2)
-            best = max(bits for bits, _ in found)
-            if held + speaks + 2 * _NUMBER_BITS < best - _TIE_BITS:
-                continue
+        # Where ranges alone do worse, it takes a guard.
+        held = max(rectangle_gain(turned.odds), turned.most - GUARD_COST) / math.log(2)
+        if held + speaks + 2 * _NUMBER_BITS < best - _BETTER_BITS:
+            continue
         outline = turned.outline()
         if outline is None:
-            continue
+            return None
         layout = Layout(written, outline.i_range, outline.j_range, outline.guards)
-        unseen = turned.unseen(outline)
-        speaks += _NUMBER_BITS * _terms_that_are_nothing(layout, unit_px) - _UNSEEN_BITS * unseen
-        found.append((outline.gain / math.log(2) + speaks, layout))
-    if not found:
-        return None
-    best = max(bits for bits, _ in found)
-    equal = [layout for bits, layout in found if bits > best - _TIE_BITS]
-    # Of equals the one that stands upright, and of these the first.
-    chosen = min(equal, key=lambda layout: round(_lean_deg(layout.lattice.basis)))
-    others = [layout.lattice.basis for layout in equal if layout is not chosen]
-    return chosen, _note([basis for basis in others if not _same_rows(basis, chosen.lattice.basis)])
+        speaks += _NUMBER_BITS * _terms_that_are_nothing(layout, unit_px)
+        found.append(_Told(layout, outline.gain / math.log(2) + speaks, turned.unseen(outline)))
+        best = max(best, found[-1].bits)
+    own = found[0]
+    if own.bits >= best - _BETTER_BITS:
+        least = own.bits - _TIE_BITS
+        chosen = min((one for one in found if one.bits >= least), key=lambda one: round(one.lean_deg))
+    else:
+        least = best - _BETTER_BITS
+        chosen = min((one for one in found if one.bits >= least), key=lambda one: (one.unseen, one.lean_deg))
+    others = [one.layout.lattice.basis for one in found if abs(one.bits - chosen.bits) < _TIE_BITS]
+    return chosen.layout, _note(
+        [basis for basis in others if not _same_rows(basis, chosen.layout.lattice.basis)]
+    )
 
 
 def bases_with_rows(basis: Array) -> list[Whole]:
@@ -87,7 +106,7 @@ def bases_with_rows(basis: Array) -> list[Whole]:
         across = np.array((0, 1) if abs(row[0]) == 1 else (1, 0))
         back = float(across @ basis @ along) / float(along @ along)
         for times in {math.floor(back), math.ceil(back)}:
-            if abs(back - times) > 0.5 + _RIGHT:
+            if abs(back - times) > 0.5 + _HALF:
                 continue
             change = _in_order(np.array([row, across - times * np.array(row)]), basis)
             if not any(_same_steps(change, other) for other in found):
@@ -115,15 +134,10 @@ def _same_steps(change: Whole, other: Whole) -> bool:
 def _for_steps(basis: Array, edges: Array) -> float:
     """What speaks for the steps of a basis whatever objects are drawn, in bits."""
     lengths = np.linalg.norm(basis, axis=1)
-    skew = float(basis[0] @ basis[1])
-    area = abs(float(np.linalg.det(basis)))
-    bits = -2 * math.log2(lengths.prod() / area)
-    if abs(skew) < _RIGHT * lengths.prod() or (np.abs(2 * abs(skew) / lengths**2 - 1) < 2 * _RIGHT).any():
-        bits += _NUMBER_BITS
+    skew = abs(float(basis[0] @ basis[1]))
+    bits = -2 * math.log2(lengths.prod() / abs(float(np.linalg.det(basis))))
     rows = [
-        _along_lines(basis[k], basis[1 - k], edges)
-        for k in (0, 1)
-        if abs(skew) <= (0.5 + _RIGHT) * lengths[k] ** 2
+        _along_lines(basis[k], basis[1 - k], edges) for k in (0, 1) if skew <= (0.5 + _HALF) * lengths[k] ** 2
     ]
     return bits + max(rows, default=0.0)
 
@@ -163,11 +177,6 @@ def _terms_that_are_nothing(layout: Layout, unit_px: float) -> int:
 
 def _angle_deg(step: Array) -> float:
     return math.degrees(math.atan2(step[1], step[0]))
-
-
-def _lean_deg(basis: Array) -> float:
-    """How far the more upright step of a basis is from standing upright, or lying level."""
-    return min(abs(math.remainder(_angle_deg(step), 90.0)) for step in basis)
 
 
 def _same_rows(basis: Array, other: Array) -> bool:

@@ -19,6 +19,7 @@ from torch import Tensor
 from p3i.grammar.leaves import with_leaves
 from p3i.interp.camera import project
 from p3i.search.answer import Answer
+from p3i.search.fit.slopes import with_slopes
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.whole import whole_filling
 from p3i.search.judge.evaluate import without_lens
@@ -54,8 +55,8 @@ def as_precise_as_fitted(evidence: Evidence, answer: Answer) -> Answer:
     index = pattern.index[evidence.in_sight(pattern, filling.theta(numbers), focal_mm=focal_mm)].double()
 
     def spread_over(part: Tensor) -> Tensor:
-        full = numbers.clone()
-        full[moving] = part
+        full = numbers.expand(*part.shape[:-1], -1).clone()
+        full[..., moving] = part
         return full
 
     def points_of(part: Tensor) -> Tensor:
@@ -86,39 +87,27 @@ def rounded(
 ) -> Tensor:
     """The numbers z [V] with as few decimals as MOST_SIGMAS and MOST_PX allow, at most `digits` [V] of them.
 
-    `droppable` [V]: which are terms that go where they are below their own deviation; `points_of` takes z to
-    the points [N, 2] that must stay.
+    `droppable` [V]: which are terms that go where they are below their own deviation; `points_of` takes z
+    [..., V] to the points [..., N, 2] that must stay.
     """
     start = points_of(numbers)
-    dropped, spread = numbers, covariance
+    found, spread = numbers, covariance
     fixed: set[int] = set()
     for k in sorted(range(len(numbers)), key=lambda k: abs(float(numbers[k])) / _sigma(covariance, k)):
-        if droppable[k] and abs(float(dropped[k])) < _sigma(spread, k):
-            tried, left = _moved(dropped, spread, k, 0.0)
+        if droppable[k] and abs(float(found[k])) < _sigma(spread, k):
+            tried, left = _moved(found, spread, k, 0.0)
             if float((points_of(tried) - start).norm(dim=1).max()) <= MOST_PX / 2:
-                dropped, spread = tried, left
+                found, spread = tried, left
                 fixed.add(k)
     rest = [k for k in range(len(numbers)) if k not in fixed]
-    finer = 1.0
-    while True:
-        found = _in_decimals(dropped, spread, rest, digits=digits, most=MOST_SIGMAS * finer)
-        if finer < 1e-3 or float((points_of(found) - start).norm(dim=1).max()) <= MOST_PX:
-            return found
-        finer /= 2
-
-
-def _in_decimals(
-    numbers: Tensor, spread: Tensor, which: list[int], *, digits: list[int], most: float
-) -> Tensor:
-    """The numbers `which` of z [V] in few decimals, off by `most` deviations together at the most."""
-    budget = most**2
-    for place, k in enumerate(which):
-        sigma, value = _sigma(spread, k), float(numbers[k])
-        allowed = sigma * math.sqrt(budget / (len(which) - place))
-        decimals = next((d for d in range(digits[k]) if abs(round(value, d) - value) <= allowed), digits[k])
-        budget = max(0.0, budget - ((round(value, decimals) - value) / sigma) ** 2)
-        numbers, spread = _moved(numbers, spread, k, round(value, decimals))
-    return numbers
+    _, slopes = with_slopes(points_of, found, torch.ones_like(found))
+    for k in rest:
+        sigma = _sigma(spread, k)
+        moves_px = float((slopes @ (spread[:, k] / sigma**2)).norm(dim=1).max())
+        most = min(MOST_SIGMAS * sigma / len(rest) ** 0.5, MOST_PX / 2 / max(moves_px, 1e-12) / len(rest))
+        decimals = min(max(0, math.ceil(-math.log10(2 * most))), digits[k])
+        found, spread = _moved(found, spread, k, round(float(found[k]), decimals))
+    return found
 
 
 def _moved(numbers: Tensor, spread: Tensor, k: int, value: float) -> tuple[Tensor, Tensor]:
