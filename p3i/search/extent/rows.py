@@ -40,6 +40,8 @@ _SKEWED_DEG = 15
 _NOTHING_PX = 0.3
 # What one number less saves (as in judge/bits.py).
 _NUMBER_BITS = 11.0
+# An outline that gains so many nats less than another draws other objects, whatever lines say: two guards.
+_WORSE = 8.0
 # Within so many bits others are no better, and within so many they are as good.
 _BETTER_BITS = 2.0
 _TIE_BITS = 0.5
@@ -47,9 +49,10 @@ _TIE_BITS = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Told:
-    """A layout, what speaks for it in bits, and how many objects it draws where nothing is seen."""
+    """A layout, its outline's gain in nats, all that speaks for it in bits, and the objects that nobody sees."""
 
     layout: Layout
+    gain: float
     bits: float
     unseen: int
 
@@ -67,27 +70,26 @@ def in_rows(cells: Cells, lattice: Lattice, *, edges: Array, unit_px: float) -> 
     lattice's own steps stay where no others are better. None where no cell is seen to hold an object.
     """
     found: list[_Told] = []
-    best = -math.inf
+    most = -math.inf
     for change in bases_with_rows(lattice.basis):
         turned = cells.changed(change)
-        if turned is None:
-            continue
-        written = lattice.with_basis(change @ lattice.basis)
-        speaks = _for_steps(written.basis, edges)
         # Where ranges alone do worse, it takes a guard.
-        held = max(rectangle_gain(turned.odds), turned.most - GUARD_COST) / math.log(2)
-        if held + speaks + 2 * _NUMBER_BITS < best - _BETTER_BITS:
+        if turned is None or max(rectangle_gain(turned.odds), turned.most - GUARD_COST) < most - _WORSE:
             continue
         outline = turned.outline()
         if outline is None:
             return None
+        written = lattice.with_basis(change @ lattice.basis)
         layout = Layout(written, outline.i_range, outline.j_range, outline.guards)
-        speaks += _NUMBER_BITS * _terms_that_are_nothing(layout, unit_px)
-        found.append(_Told(layout, outline.gain / math.log(2) + speaks, turned.unseen(outline)))
-        best = max(best, found[-1].bits)
-    own = found[0]
-    if own.bits >= best - _BETTER_BITS:
-        least = own.bits - _TIE_BITS
+        bits = outline.gain / math.log(2) + _for_steps(written.basis, edges)
+        bits += _NUMBER_BITS * _terms_that_are_nothing(layout, unit_px)
+        found.append(_Told(layout, outline.gain, bits, turned.unseen(outline)))
+        most = max(most, outline.gain)
+    found = [one for one in found if one.gain >= most - _WORSE]
+    best = max(one.bits for one in found)
+    own = found[0].bits if np.array_equal(found[0].layout.lattice.basis, lattice.basis) else -math.inf
+    if own >= best - _BETTER_BITS:
+        least = own - _TIE_BITS
         chosen = min((one for one in found if one.bits >= least), key=lambda one: round(one.lean_deg))
     else:
         least = best - _BETTER_BITS
