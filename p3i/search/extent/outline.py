@@ -111,7 +111,8 @@ def best_outline(evidence: Array, *, i_start: int = 0, j_start: int = 0) -> Outl
     found += [_improved(worth, i, j, _bounds(evidence > 0), guards) for guards in _diamonds(worth, i, j)]
     best = max(found, key=lambda outline: outline.gain)
     best = _without_idle_guards(worth, i, j, best)
-    i0, i1, j0, j1 = *best.i_range, *best.j_range
+    inside = _inside(i, j, (*best.i_range, *best.j_range), best.guards)
+    i0, i1, j0, j1 = _bounds(inside) if inside.any() else (*best.i_range, *best.j_range)
     return Outline(
         (i0 + i_start, i1 + i_start),
         (j0 + j_start, j1 + j_start),

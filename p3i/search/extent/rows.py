@@ -4,7 +4,7 @@ A lattice has many bases, and every one draws the same points. The shortest is t
 the fields of a chessboard; a person takes the rows. What speaks for a basis, in bits:
 
 - the objects that its ranges and guards hold, by the evidence of the cells, less what these cost to say;
-- the lines of the pattern, if rows run along them: told the direction, they need not be told one by one;
+- the lines of the pattern, if rows run along them: then their direction need not be told;
 - a term that is nothing: one number less;
 - right angles: steps that are no longer than they need be.
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.search.extent.outline import GUARD_COST, Cells, rectangle_gain
-from p3i.search.forms.lattice import Lattice
+from p3i.search.forms.lattice import Lattice, reduce_basis
 from p3i.search.forms.layout import Layout
 
 Array = NDArray[np.float64]
@@ -43,13 +43,13 @@ _NUMBER_BITS = 11.0
 # An outline that gains so many nats less than another draws other objects, whatever lines say: two guards.
 _WORSE = 8.0
 # Within so many bits others are no better, and within so many they are as good.
-_BETTER_BITS = 2.0
+_BETTER_BITS = 3.0
 _TIE_BITS = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Told:
-    """A layout, its outline's gain in nats, all that speaks for it in bits, and the objects that nobody sees."""
+    """A layout, its outline's gain in nats, all that speaks for it in bits, and its objects out of sight."""
 
     layout: Layout
     gain: float
@@ -67,8 +67,12 @@ def in_rows(cells: Cells, lattice: Lattice, *, edges: Array, unit_px: float) -> 
     """The lattice's objects in the steps that most bits speak for, and what to say of others as natural.
 
     `edges` [180] as `look/edges.py` tells them of the plane, `unit_px` a program unit in pixels. The
-    lattice's own steps stay where no others are better. None where no cell is seen to hold an object.
+    shortest steps are taken where no others are better. None where no cell is seen to hold an object.
     """
+    shortest = reduce_basis(lattice.basis)
+    in_shortest = cells.changed(np.round(shortest @ np.linalg.inv(lattice.basis)).astype(int))
+    if in_shortest is not None:
+        cells, lattice = in_shortest, lattice.with_basis(shortest)
     found: list[_Told] = []
     most = -math.inf
     for change in bases_with_rows(lattice.basis):
@@ -147,7 +151,8 @@ def _for_steps(basis: Array, edges: Array) -> float:
 def _along_lines(row: Array, step: Array, edges: Array) -> float:
     """What is saved of a cell's lines where they run along a row, or across it, in bits.
 
-    Across is where the rows after the next lie, if that is about a right angle on a plane of a guessed focal.
+    That is two numbers at the most: their direction, and that they go on in the next cell. Across is where
+    the rows after the next lie, if that is about a right angle on a plane of a guessed focal.
     """
     turn = _angle_deg(row)
     off = [(_angle_deg(step + times * row / 2) - turn) % 180 for times in (-2, -1, 0, 1, 2)]
@@ -157,12 +162,17 @@ def _along_lines(row: Array, step: Array, edges: Array) -> float:
     both = along_row + along_step
     if both <= _BY_CHANCE:
         return 0.0
-    told = both * math.log2(both / _BY_CHANCE)
-    told += (1 - both) * math.log2((1 - both) / (1 - _BY_CHANCE)) if both < 1 else 0
+    frame = _SAMPLES * _lead(both, _BY_CHANCE)
     lead = along_row / both
-    if both > 0.5 and lead > 0.5:  # most lines run this way: they are its rows
-        told += both * (1 + lead * math.log2(lead) + ((1 - lead) * math.log2(1 - lead) if lead < 1 else 0))
-    return _SAMPLES * told
+    # Where most lines run along the row, they run on from object to object.
+    through = _SAMPLES * both * _lead(lead, 0.5) if min(both, lead) > 0.5 else 0.0
+    return min(frame, _NUMBER_BITS) + min(through, _NUMBER_BITS)
+
+
+def _lead(share: float, chance: float) -> float:
+    """The bits that a sample saves of which this share is one of two kinds, where by chance that share is."""
+    parts = ((share, chance), (1 - share, 1 - chance))
+    return sum(part * math.log2(part / by_chance) for part, by_chance in parts if part > 0)
 
 
 def _share(edges: Array, angle_deg: float) -> float:
