@@ -124,11 +124,14 @@ def reduce_basis(basis: np.ndarray) -> np.ndarray:
 def in_shortest_steps(pattern: Pattern) -> Pattern:
     """The same points under the shortest basis, their indices counted from 0: what lattices are judged in.
 
-    `pattern` is of rows of rows, in which steps ever they were written; its own `program` keeps these.
+    `pattern` is of rows of rows, in which steps ever they were written; its own `program` keeps these. One
+    that is in these steps already stays as it is.
     """
     lattice = Lattice.of(pattern, pattern.theta)
     basis = reduce_basis(lattice.basis)
     change = np.round(lattice.basis @ np.linalg.inv(basis))
+    if np.isclose(np.square(basis).sum(), np.square(lattice.basis).sum(), rtol=1e-9):
+        return pattern
     index = pattern.index.double() @ torch.from_numpy(change)
     first = index.amin(0)
     moved = Lattice(lattice.rx_deg, lattice.ry_deg, basis, lattice.origin + first.numpy() @ basis)
