@@ -21,6 +21,8 @@ Arrangement = Literal["grid", "ring", "rings", "curve"]
 _OPEN = 1.6
 """A ring whose widest gap is this many times its usual one is an arc, and begins after that gap."""
 _SAME = 1e-6
+_HALF = 0.2
+"""Rows whose shift is so near to a half step, in half steps, are those of bricks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,11 +95,27 @@ def _grid(placed: Placed) -> Naming:
     straight = abs(along[0][0]) + abs(along[1][1])
     crossed = abs(along[1][0]) + abs(along[0][1])
     across, down = (1, 0) if crossed > straight + _SAME else (0, 1)
-    numbers = []
-    for variable, axis in ((down, 1), (across, 0)):
-        steps = placed.index[:, variable] * (-1 if along[variable][axis] < -_SAME else 1)
-        numbers.append(steps - steps.min())
-    return _numbered("grid", numbers[0], numbers[1])
+    signs = {
+        variable: -1 if along[variable][axis] < -_SAME else 1 for variable, axis in ((down, 1), (across, 0))
+    }
+    rows, columns = (signs[variable] * placed.index[:, variable] for variable in (down, across))
+    rows = rows - rows.min()
+    shift = _shift(placed, across) * signs[across] * signs[down]
+    return _numbered("grid", rows, columns + np.floor(shift * rows + _SAME).astype(np.int64))
+
+
+def _shift(placed: Placed, across: int) -> float:
+    """By how much of a step each row starts further along than the one before: whole halves, as of bricks.
+
+    Numbers then run down the wall, not along the diagonal: every other row begins half a step to the right.
+    A shift that is no half (a keyboard's, or a wrong focal's) is none.
+    """
+    basis = placed.basis
+    if basis is None:
+        return 0.0
+    step, down = basis[across], basis[1 - across]
+    shift = float(step @ down) / float(step @ step)
+    return round(2 * shift) / 2 if abs(2 * shift - round(2 * shift)) < _HALF else 0.0
 
 
 def _seen_direction(placed: Placed, variable: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from p3i.search.judge.table1 import unwritable_note, within_table1
 from p3i.search.look.session import Session
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
+from p3i.search.optics.printed import as_precise_as_fitted
 from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
 from p3i.search.readings import offers, other_readings, reading_notes
 from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
@@ -31,7 +32,8 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         answers = within_table1(look, answers)
     # What a person asked for is theirs to choose, whatever it costs.
     asked = asks_for_itself(config)
-    printed = with_printed_scores(look.evidence, answers, needed=needed if asked else None)
+    written = answers if asked else [as_precise_as_fitted(look.evidence, answer) for answer in answers]
+    printed = with_printed_scores(look.evidence, written, needed=needed if asked else None)
     sure = convincing(answers, printed, needed=needed if asked else None)
     good = sure if asked else [answer for answer in sure if _in_sight(look, answer)]
     if not good:

@@ -43,6 +43,17 @@ def test_names_follow_the_photo_whichever_way_the_loops_run(draw: str) -> None:
     assert found.objects[0].y_px < found.objects[-1].y_px
 
 
+@pytest.mark.parametrize("lean", [1, -1])
+def test_the_bricks_of_a_wall_are_numbered_down_the_wall(lean: int) -> None:
+    guards = "        if 2*i + j >= 0:\n            if 2*i + j <= 9:\n                "
+    text = BOARD.replace("range(0, 12)", "range(-9, 12)").replace("        Draw", guards + "Draw")
+    text = text.replace("x=5*i - 27.5", "x=5*i + 2.5*j - 15")
+    if lean < 0:
+        text = text.replace("2*i + j", "2*i - j").replace("2.5*j", "-2.5*j").replace("+ -", "- ")
+    found = names(text)
+    assert found == [f"{row}{column}" for row in "ABCDEFGH" for column in range(1, 6)]
+
+
 def test_letters_go_on_after_z() -> None:
     assert [letters(row) for row in (0, 25, 26, 51, 52, 701, 702)] == [
         "A",

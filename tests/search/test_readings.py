@@ -13,8 +13,9 @@ from p3i.grammar.ast import CameraPose, Draw, For, Program
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.extent.layout import Layout, found_layout
+from p3i.search.extent.layout import found_layout
 from p3i.search.forms.lattice import Lattice
+from p3i.search.forms.layout import Layout
 from p3i.search.look.evidence import Evidence
 from p3i.search.readings import offers, reading_notes
 from p3i.search.result import Reading, StopReason, SynthesisResult

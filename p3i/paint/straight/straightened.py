@@ -15,7 +15,7 @@ import torch
 from p3i.errors import UsageError
 from p3i.interp.lens import photo_from_straight, straight_from_photo
 from p3i.options.rectify import CellSize
-from p3i.paint.straight.supercell import reduced
+from p3i.paint.straight.supercell import reduced, row_of
 from p3i.place.placed import Placed
 from p3i.size import Size
 from p3i.vision.sheet import project
@@ -118,15 +118,18 @@ def upright_from_plane(placed: Placed, *, upright: bool, cell: CellSize | None) 
 
 def _metric(basis: np.ndarray, cell: CellSize) -> np.ndarray:
     """A map of the plane without reflection that gives the cell of `basis` (rows u, v) its true size."""
-    # The width is that of the basis vector that runs more across.
-    swapped = abs(basis[0, 0]) < abs(basis[1, 0])
-    first, second = (basis[1], basis[0]) if swapped else (basis[0], basis[1])
+    # The width is that of the row, or of the step that runs more across.
+    row = row_of(basis)
+    first, second = basis[::-1] if (abs(basis[0, 0]) < abs(basis[1, 0]) if row is None else row) else basis
     side = math.copysign(1.0, first[0] * second[1] - first[1] * second[0])
     shift = float(first @ second / (first @ first))
     # A brick wall's rows are shifted by half a brick; what is a little off owes it to the focal.
     nearest = round(2 * shift) / 2
     shift = nearest if abs(shift - nearest) <= _SKEW_SNAP else shift
-    target = np.array([[cell.width_mm, 0.0], [shift * cell.width_mm, side * cell.height_mm]])
+    along, across = cell.width_mm, cell.height_mm
+    if row is not None and abs(first[1]) > abs(first[0]):  # rows that stand are columns
+        along, across = across, along
+    target = np.array([[along, 0.0], [shift * along, side * across]])
     return np.linalg.solve(np.array([first, second]), target).T
 
 
@@ -134,14 +137,15 @@ def _off_axis_rad(basis: np.ndarray) -> float:
     """The least angle that a view must turn back for the lattice to stand straight in it.
 
     That is: u across (or v, where u is more than 45 degrees off), or a pair of directions at right angles
-    along both axes; u + v and u - v are one where u and v are as long as each other, as on a chessboard.
+    along both axes; u + v and u - v are one where u and v are as long as each other, as on a chessboard, and
+    u and 2v - u where the next row is shifted by half, as of bricks.
     """
     u, v = basis if _angle_between_deg(*basis) >= _LEAST_ANGLE_DEG else reduced(basis) @ basis
     across = [math.remainder(_angle_rad(vector), math.pi) for vector in (u, v)]
     turns = [min(across, key=abs) if abs(across[0]) > math.pi / 4 else across[0]]
     turns += [
         math.remainder(_angle_rad(first), math.pi / 2)
-        for first, second in ((u, v), (u + v, u - v))
+        for first, second in ((u, v), (u + v, u - v), (u, 2 * v - u), (v, 2 * u - v))
         if _square(first, second)
     ]
     # Equal choices should not hang on rounding: the first of those that are nearly the least.

@@ -16,6 +16,9 @@ MOST = 4
 MOST_CELLS = 8
 """A rectangle of more cells than this is no texture that anyone would want."""
 
+_HALF = 0.1
+"""Rows that are shifted by half to within this share of a half."""
+
 TOLERANCE_DEG = 3.0
 """Sides that are this near to a right angle count as rectangular: an assumed focal skews by as much."""
 
@@ -42,15 +45,17 @@ class SuperCell:
 def supercell(basis: np.ndarray) -> SuperCell:
     """The rectangle of fewest cells; where none is rectangular, the nearest to it of up to four cells.
 
+    Where rows are shifted by half, of bricks or along the fields of a chessboard, it stands on them.
+
     `basis` [2, 2] has rows u and v, not parallel.
     """
-    shortest = reduced(basis)
+    shortest, row = reduced(basis), row_of(basis)
     steps = [np.array(pair) @ shortest for pair in product(range(-MOST, MOST + 1), repeat=2) if any(pair)]
     vectors = [(pair, pair @ basis) for pair in steps if math.gcd(*pair.tolist()) == 1]
     for widest_deg in (45.0, 90.0):
         rights = [(pair, p) for pair, p in vectors if abs(_angle_deg(p)) <= widest_deg + 1e-9]
         found = [
-            (_rank(cell), cell)
+            (_rank(cell, row), cell)
             for first in rights
             for second in vectors
             if (cell := _cell(first, second)) is not None
@@ -58,6 +63,17 @@ def supercell(basis: np.ndarray) -> SuperCell:
         if found:
             break
     return min(found, key=lambda ranked: ranked[0])[1]
+
+
+def row_of(basis: np.ndarray) -> int | None:
+    """Which step of a basis is a row that the next is shifted against by half, as bricks are; or None.
+
+    Every step to the middle of the next row is one too, seen slantwise: the row is the straighter of the two.
+    """
+    leans = [abs(math.remainder(_angle_deg(step), 90.0)) for step in basis]
+    halves = np.abs(2 * np.abs(basis[0] @ basis[1]) / np.square(basis).sum(axis=1) - 1) < _HALF
+    k = int(leans[1] < leans[0])
+    return k if halves[k] and leans[k] < leans[1 - k] - 1 else None
 
 
 def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> SuperCell | None:
@@ -73,14 +89,18 @@ def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.nda
     return SuperCell(np.array([across, down]), np.array([p, q]), cells, shear_deg)
 
 
-def _rank(cell: SuperCell) -> tuple[float, ...]:
-    """Less is better; no two super-cells of a lattice rank alike."""
-    off = abs(cell.shear_deg)
+def _rank(cell: SuperCell, row: int | None) -> tuple[float, ...]:
+    """Less is better; no two super-cells of a lattice rank alike.
+
+    In a honeycomb three rectangles are as large as each other, turned by 60 degrees, and which is the most
+    exact is chance: the one that is turned least counts.
+    """
+    off, lean = abs(cell.shear_deg), abs(_angle_deg(cell.sides[0]))
+    astray = 0.0 if row is None or (np.abs(cell.steps) == np.eye(2)[row]).all(axis=1).any() else 1.0
     # Of those that are skewed, a cell more must halve the angle.
-    order = (0.0, cell.cells, off) if cell.rectangular else (1.0, off * 2 ** (cell.cells - 1), 0.0)
+    order = (0.0, astray, cell.cells, lean) if cell.rectangular else (1.0, off * 2 ** (cell.cells - 1))
     longer = float(np.linalg.norm(cell.sides, axis=1).max())
-    lean = abs(_angle_deg(cell.sides[0]))
-    return (*(round(number, 6) for number in (*order, longer, lean)), *cell.steps.ravel().tolist())
+    return (*(round(number, 6) for number in (*order, longer, lean, off)), *cell.steps.ravel().tolist())
 
 
 def reduced(basis: np.ndarray) -> np.ndarray:

@@ -2,12 +2,13 @@
 
 from torch import Tensor
 
-from p3i.search.extent.layout import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
+from p3i.search.extent.layout import filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.extent.primitive import primitive
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.fitting import FEWEST_CELLS
 from p3i.search.fit.grow import follow
 from p3i.search.forms.lattice import Lattice
+from p3i.search.forms.layout import Layout
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.contrast import score_of
 from p3i.search.look.session import Session
@@ -37,8 +38,8 @@ def drawn_lattice(look: Session, fit: Fit) -> Drawn | None:
 def _surest(look: Session, readings: list[tuple[Tensor, Tensor]]) -> Drawn | None:
     """Of one ground's cells (theta [P], index [N, 2]), each drawn, the surest."""
     pattern = lattice_filling().pattern
-    layouts = (found_layout(look.evidence, Lattice.of(pattern, theta), cells) for theta, cells in readings)
-    drawn = (_drawn(look, layout) for layout in layouts if layout is not None)
+    found = (found_layout(look.evidence, Lattice.of(pattern, theta), cells) for theta, cells in readings)
+    drawn = (_drawn(look, *one) for one in found if one is not None)
     return max((one for one in drawn if one is not None), key=lambda one: one.sure, default=None)
 
 
@@ -48,12 +49,12 @@ def filling_picture(look: Session, fit: Fit) -> Drawn:
     return Drawn(layout.program(from_zero=not look.config.strict), fit, 0.0)
 
 
-def _drawn(look: Session, found: Layout) -> Drawn | None:
-    """The program of a layout, under the options that change what is drawn."""
-    layout, notes = refitted(look.evidence, found), ()
+def _drawn(look: Session, found: Layout, note: str) -> Drawn | None:
+    """The program of a layout with its note, under the options that change what is drawn."""
+    layout, notes = refitted(look.evidence, found), (note,) if note else ()
     if look.config.strict:
         free, (layout, moved) = layout, strict_layout(layout)
-        notes = (_strict_note(free, layout, moved * look.evidence.image.size.unit_px),)
+        notes = (*notes, _strict_note(free, layout, moved * look.evidence.image.size.unit_px))
     measured = layout_fit(look.evidence, layout)
     if measured is None:
         return None

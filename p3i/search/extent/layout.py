@@ -1,29 +1,32 @@
 """From a fit to a program: which point of the cell is the object, which cells hold one, and the text."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
 import torch
 from torch import Tensor
 
-from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
+from p3i.grammar.ast import Program
 from p3i.interp.camera import image_from_plane
 from p3i.interp.compile import compile
-from p3i.search.extent.outline import Outline
+from p3i.search.extent.outline import Cells, Outline
 from p3i.search.extent.phase import Phase, find_phases
-from p3i.search.extent.presence import find_extent
+from p3i.search.extent.presence import cells_that_hold
+from p3i.search.extent.rows import in_rows
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
 from p3i.search.fit.settle import objects_of, settled
-from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
+from p3i.search.forms.layout import Layout
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
+from p3i.search.look.edges import edge_directions
 from p3i.search.look.evidence import Evidence
 from p3i.search.result import Reading
 from p3i.vision.warp import in_frame
@@ -37,54 +40,6 @@ _SHOWN = (-6, 7)
 _RIVAL = 0.05
 _FEW_MISSES = 0.04
 _MOST_BITS = 50.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Layout:
-    """A lattice with its objects: half-open index ranges and guards (a, b, c) for a*i + b*j >= c.
-
-    `readings` are the places of the cell that may be its object, the likeliest first.
-    """
-
-    lattice: Lattice
-    i_range: tuple[int, int]
-    j_range: tuple[int, int]
-    guards: tuple[tuple[int, int, int], ...] = ()
-    readings: tuple[Reading, ...] = ()
-
-    def holds(self, index: np.ndarray) -> np.ndarray:
-        """Which rows of `index` [N, 2] the layout draws."""
-        i, j = index[:, 0], index[:, 1]
-        inside = (
-            (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
-        )
-        for a, b, c in self.guards:
-            inside &= a * i + b * j >= c
-        return inside
-
-    def program(self, *, from_zero: bool = True) -> Program:
-        """The program, with both loops starting at 0, or else at the first index of each range.
-
-        Where the origin is 0, the latter needs no constants in `Draw` and guards, of which Table 1 has none.
-        """
-        (i0, i1), (j0, j1) = self.i_range, self.j_range
-        i_start, j_start = (0, 0) if from_zero else (i0, j0)
-        i_skip, j_skip = i0 - i_start, j0 - j_start
-        u, v = self.lattice.basis
-        origin = self.lattice.origin + i_skip * u + j_skip * v
-
-        def length(value: float) -> float:
-            return round(float(value), LENGTH_DIGITS)
-
-        body: Draw | If = Draw(
-            Affine(length(u[0]), length(v[0]), length(origin[0])),
-            Affine(length(u[1]), length(v[1]), length(origin[1])),
-        )
-        for a, b, c in reversed(self.guards):
-            body = If(Affine(a, b, a * i_skip + b * j_skip - c), body)
-        inner = For("j", Affine(constant=j_start), Affine(constant=j1 - j_skip), body)
-        pose = CameraPose(round(self.lattice.rx_deg, ANGLE_DIGITS), round(self.lattice.ry_deg, ANGLE_DIGITS))
-        return Program(pose, For("i", Affine(constant=i_start), Affine(constant=i1 - i_skip), inner))
 
 
 def proposed(guess: Guess) -> Program:
@@ -103,39 +58,51 @@ def supported(fit: Fit) -> Program:
     return Layout(Lattice.of(fit.pattern, fit.theta), (low[0], high[0]), (low[1], high[1])).program()
 
 
-def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:
-    """The objects of a lattice whose cells `ground` [N, 2] are sure: phase and extent from the photo.
+def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[Layout, str] | None:
+    """The objects of a lattice whose cells `ground` [N, 2] are sure: phase, extent and rows from the photo.
 
     They lie at the likeliest place of the cell, or at the one that the options ask for where the cell has it.
-    None where no object is seen.
+    With a note on other rows that are as natural, else "". None where no object is seen.
     """
     image = evidence.image
     matrix, support = _seen(evidence, lattice, ground)
     phases = find_phases(image.pixels, image.valid, matrix, lattice.basis, support)
 
-    def outline(phase: Phase) -> Outline | None:
-        return find_extent(image.pixels, image.valid, matrix, lattice.basis, phase.origin, support)
+    @cache
+    def cells(origin: tuple[float, float]) -> Cells | None:
+        at = np.array(origin)
+        return cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, at, support)
+
+    def held(phase: Phase) -> Cells | None:
+        return cells((float(phase.origin[0]), float(phase.origin[1])))
 
     if not phases:
         return None
-    phases, outlines = _weighed(phases, outline)
+    phases = _weighed(phases, lambda phase: None if (found := held(phase)) is None else found.outline())
     asked = evidence.config.object
     names = [phase.name or str(rank) for rank, phase in enumerate(phases, 1)]
-    at = next((k for k, name in enumerate(names) if asked in (name, str(k + 1))), 0)
-    drawn = phases[at]
-    from_drawn = [(phase.origin - drawn.origin) @ np.linalg.inv(lattice.basis) for phase in phases]
+    drawn = phases[next((k for k, name in enumerate(names) if asked in (name, str(k + 1))), 0)]
+    edges = edge_directions(image.pixels, matrix, support & image.valid)
+    there, own = held(drawn), replace(lattice, origin=drawn.origin)
+    found = None if there is None else in_rows(there, own, edges=edges, unit_px=image.size.unit_px)
+    if found is None or _is_a_row(found[0]):
+        return None
+    layout, note = found
+    from_drawn = [(phase.origin - drawn.origin) @ np.linalg.inv(layout.lattice.basis) for phase in phases]
     readings = tuple(
         Reading(name, phase.probability, (float(step[0]), float(step[1])))
         for name, phase, step in zip(names, phases, from_drawn, strict=True)
     )
-    found = outlines[at] or outline(drawn)
-    return _layout(replace(lattice, origin=drawn.origin), found, readings)
+    return replace(layout, readings=readings), note
 
 
-def _weighed(
-    phases: Sequence[Phase], outline: Callable[[Phase], Outline | None]
-) -> tuple[list[Phase], list[Outline | None]]:
-    """Phases with the probability that their objects give them, the likeliest first, with what was outlined.
+def _is_a_row(layout: Layout) -> bool:
+    """Whether a layout is a single row, which fixes no plane."""
+    return min(stop - start for start, stop in (layout.i_range, layout.j_range)) < 2
+
+
+def _weighed(phases: Sequence[Phase], outline: Callable[[Phase], Outline | None]) -> list[Phase]:
+    """Phases with the probability that their objects give them, the likeliest first.
 
     `outline` says where a phase has objects. It is asked for the first one and for its rivals.
     """
@@ -149,7 +116,7 @@ def _weighed(
     odds = np.array([phase.probability for phase in phases]) * 2.0 ** np.clip(more, -_MOST_BITS, _MOST_BITS)
     odds /= odds.sum()
     order = np.argsort(-odds, kind="stable")
-    return [replace(phases[k], probability=float(odds[k])) for k in order], [outlines[k] for k in order]
+    return [replace(phases[k], probability=float(odds[k])) for k in order]
 
 
 def _whole(outline: Outline) -> bool:
@@ -163,14 +130,12 @@ def layout_at(
     """The objects of a lattice that lie at its points, one of the `readings`; else as found_layout."""
     image = evidence.image
     matrix, support = _seen(evidence, lattice, ground)
-    found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
-    return _layout(lattice, found, readings)
-
-
-def _layout(lattice: Lattice, found: Outline | None, readings: tuple[Reading, ...]) -> Layout | None:
-    if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
-        return None  # one row fixes no plane
-    return Layout(lattice, found.i_range, found.j_range, found.guards, readings)
+    cells = cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
+    found = None if cells is None else cells.outline()
+    if found is None:
+        return None
+    layout = Layout(lattice, found.i_range, found.j_range, found.guards, readings)
+    return None if _is_a_row(layout) else layout
 
 
 def _seen(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[np.ndarray, np.ndarray]:
@@ -230,7 +195,7 @@ def layout_fit(evidence: Evidence, layout: Layout) -> Fit | None:
     if not found:
         return None
     best = max(found, key=lambda one: score_of(one.contrast))
-    return weighed(best.level, drawn, drawn.theta, best.index, best.contrast)
+    return weighed(best.level, best.pattern, best.pattern.theta, best.index, best.contrast)
 
 
 def refitted(evidence: Evidence, layout: Layout) -> Layout:

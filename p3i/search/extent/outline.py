@@ -29,10 +29,13 @@ DIRECTIONS = tuple(
 )
 """Normals of guards; those along i or j alone are what the ranges are for."""
 
-_GUARD_BITS = 6.0  # which of the four diagonals, and its threshold
+GUARD_BITS = 6.0
+"""To say that there is one more guard: which of the four diagonals, and its threshold."""
+
 _SLOPE_BITS = 1.5  # for each unit of |a| + |b| beyond 2
 _MOST_GUARDS = 3
 _ROUNDS = 6
+_MOST_CELLS = 200_000  # of a table that other steps shear
 _IDLE = 1e-3  # bits that a cell costs, so that outlines do not reach out for nothing
 
 
@@ -58,6 +61,60 @@ class Outline:
         for a, b, c in self.guards:
             inside &= a * i + b * j >= c
         return inside
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """What is known of a lattice's cells: `bits` [R, C] that speak for an object, of (i, j) from `first` on.
+
+    `judged` [R, C]: which of the cells the photo shows well enough.
+    """
+
+    bits: Array
+    judged: NDArray[np.bool_]
+    first: tuple[int, int]
+
+    def changed(self, change: NDArray[np.int64]) -> "Cells | None":
+        """The same cells under the steps `change` [2, 2], whole rows in terms of the present ones.
+
+        None where the table would be too large.
+        """
+        j, i = np.nonzero((self.bits != 0) | self.judged)
+        index = (np.stack([i, j], 1) + self.first) @ np.round(np.linalg.inv(change)).astype(int)
+        if len(index) == 0:
+            return self
+        low, high = index.min(0), index.max(0) + 1
+        if (high - low).prod() > _MOST_CELLS:
+            return None
+        bits, judged = np.zeros((high - low)[::-1]), np.zeros((high - low)[::-1], bool)
+        at = tuple((index - low).T[::-1])
+        bits[at], judged[at] = self.bits[j, i], self.judged[j, i]
+        return Cells(bits, judged, (int(low[0]), int(low[1])))
+
+    def outline(self) -> Outline | None:
+        """What of the cells is drawn; None where nothing speaks for any."""
+        found = best_outline(self.bits, i_start=self.first[0], j_start=self.first[1])
+        if found is None:
+            return None
+        seen = self._held(found) & self.judged
+        return replace(found, there=int((self.bits[seen] > 0).sum()), seen=int(seen.sum()))
+
+    def unseen(self, outline: Outline) -> int:
+        """How many cells an outline holds of which nothing is known."""
+        box = [np.arange(*ends) for ends in (outline.i_range, outline.j_range)]
+        known = (self.bits != 0) | self.judged
+        return int(outline.holds(*np.meshgrid(*box)).sum()) - int((self._held(outline) & known).sum())
+
+    def _held(self, outline: Outline) -> NDArray[np.bool_]:
+        """Which of the cells [R, C] an outline holds."""
+        rows, columns = self.bits.shape
+        i, j = np.meshgrid(np.arange(columns) + self.first[0], np.arange(rows) + self.first[1])
+        return outline.holds(i, j)
+
+    @property
+    def most(self) -> float:
+        """The bits that the best outline could hold at most."""
+        return float(np.maximum(self.bits, 0).sum())
 
 
 def best_outline(
@@ -87,6 +144,10 @@ def best_outline(
     best = max(found, key=lambda outline: outline.gain)
     best = _without_idle_guards(worth, i, j, best)
     best = _without_empty_lines(worth, i, j, best)
+    inside = best.holds(i, j)
+    if inside.any():
+        i0, i1, j0, j1 = _bounds(inside)
+        best = replace(best, i_range=(i0, i1), j_range=(j0, j1))
     if halves is not None:
         best = _with_rims(halves, i, j, best)
     i0, i1, j0, j1 = *best.i_range, *best.j_range
@@ -105,7 +166,7 @@ def _bounds(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
 
 
 def _cost(guards: tuple[tuple[int, int, int], ...]) -> float:
-    return sum(_GUARD_BITS + _SLOPE_BITS * (abs(a) + abs(b) - 2) for a, b, _ in guards)
+    return sum(GUARD_BITS + _SLOPE_BITS * (abs(a) + abs(b) - 2) for a, b, _ in guards)
 
 
 def _inside(
@@ -207,7 +268,7 @@ def _without_empty_lines(worth: Array, i: Indices, j: Indices, outline: Outline)
         ("i_range", kept.sum(axis=0), outline.i_range),
         ("j_range", kept.sum(axis=1), outline.j_range),
     ):
-        empty = np.flatnonzero(line[start:stop] < -_GUARD_BITS) + start
+        empty = np.flatnonzero(line[start:stop] < -GUARD_BITS) + start
         if len(empty) == 0:
             continue
         for first, last in zip((start, *(empty + 1)), (*empty, stop), strict=True):

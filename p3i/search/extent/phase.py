@@ -56,7 +56,7 @@ def find_phases(
 
     Empty where no cell shows.
 
-    Convention: as in p3i.search.extent.presence.find_extent; the plane may have any origin.
+    Convention: as in p3i.search.extent.presence.cells_that_hold; the plane may have any origin.
     """
     small, mask, matrix = working_size(pixels, valid, image_from_plane)
     if support is not None and support.shape != mask.shape:

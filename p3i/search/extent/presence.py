@@ -1,8 +1,8 @@
-"""The extent of a lattice: which of its cells hold an object, and the short outline that says so.
+"""Which of a lattice's cells hold an object, in bits for each.
 
-What each cell says for an object is told in bits by p3i.vision.cell_bits; the outline with most bits less
-what it costs to say is the answer (outline.py). What lies under a mask or is too small to be judged is
-unknown: to draw an object there costs a bit, as a claim that nobody can check.
+What each cell says for an object is told by p3i.vision.cell_bits; which of them are drawn, the outline says
+(outline.py). What lies under a mask or is too small to be judged is unknown: to draw an object there costs a
+bit, as a claim that nobody can check.
 """
 
 from dataclasses import replace
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.search.extent.alike import look_alike, working_size
-from p3i.search.extent.outline import Outline, best_outline
+from p3i.search.extent.outline import Cells, best_outline
 from p3i.vision.cell_bits import cell_bits
 from p3i.vision.sheet import Box, cell_sides_px, cells_from_basis, project
 
@@ -24,15 +24,15 @@ _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
 _UNKNOWN_BITS = 1.0  # what it costs to claim an object that is unknown: as likely true as not
 
 
-def find_extent(
+def cells_that_hold(
     pixels: Floats,
     valid: Mask,
     image_from_plane: Array,
     basis: Array,
     origin: Array,
     support: NDArray | None = None,
-) -> Outline | None:
-    """The outline of the cells of a lattice that hold an object in a photo; None where none is seen to.
+) -> Cells | None:
+    """How surely each cell of a lattice holds an object in a photo; None where none is seen to.
 
     Convention: pixels [H, W, 3] RGB in 0..1, valid [H, W]; `image_from_plane` 3x3 maps plane points in front
     of the camera to positive third coordinates; basis [2, 2] has rows u, v and origin [2] is the middle of an
@@ -50,16 +50,21 @@ def find_extent(
     if not (found.whole > 0).any():
         return None
     grid = (box.rows, box.columns)
-    outline = best_outline(
-        np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid),
-        halves=found.halves.reshape(4, *grid),
-        i_start=box.i_start,
-        j_start=box.j_start,
-    )
-    if outline is None:
-        return None
-    seen = outline.holds(*box.indices.T) & found.judged
-    return replace(outline, there=int((found.whole[seen] > 0).sum()), seen=int(seen.sum()))
+    bits = np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid)
+    cells = Cells(bits, found.judged.reshape(grid), (box.i_start, box.j_start))
+    halves = found.halves.reshape(4, *grid)
+    return replace(cells, bits=_with_rims(bits, halves))
+
+
+def _with_rims(bits: Array, halves: Array) -> Array:
+    """The bits [R, C] of cells, those along a rim by their halves [4, R, C] towards the pattern."""
+    rows, columns = bits.shape
+    i, j = np.meshgrid(np.arange(columns), np.arange(rows))
+    outlines = best_outline(bits), best_outline(bits, halves=halves)
+    if outlines[0] is None or outlines[1] is None:
+        return bits
+    inside, wider = (outline.holds(i, j) for outline in outlines if outline is not None)
+    return np.where(wider & ~inside, np.maximum(bits, halves.max(0)), bits)
 
 
 def _middle_shows(image_from_cells: Array, box: Box, shape: tuple[int, int]) -> tuple[Mask, Mask]:

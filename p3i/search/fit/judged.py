@@ -20,7 +20,7 @@ from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
-from p3i.search.forms.lattice import Lattice, cell_px, cells_in_view
+from p3i.search.forms.lattice import Lattice, cell_px, cells_in_view, in_shortest_steps
 from p3i.search.look.cells import HALF_STEPS, contrast, sample_grid, sample_points
 from p3i.search.look.evidence import Evidence, Level
 from p3i.search.look.patches import (
@@ -53,11 +53,14 @@ _LEAST_WEIGHT = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedCells:
-    """Cells `index` [N, 2] of a program, the map that they were read off, and their contrast [N].
+    """Cells `index` [N, 2] of `pattern`, the map that they were read off, and their contrast [N].
 
-    `whole`: whether they are those that the picture shows whole; else they are all whose middle it shows.
+    `pattern` draws the program's points in the shortest steps, since a score is of the points, not of the
+    words that tell them. `whole`: whether the cells are those that the picture shows whole; else they are all
+    whose middle it shows.
     """
 
+    pattern: Pattern
     level: Level
     index: Tensor
     contrast: Tensor
@@ -82,6 +85,7 @@ def sweeps_cells(pattern: Pattern) -> bool:
 
 def judged_cells(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedCells]:
     """The cells that a program of rows draws and the photo shows, in each of the features that judge."""
+    pattern = in_shortest_steps(pattern)
     seen = pattern.index[evidence.in_sight(pattern)].double()
     if len(seen) == 0:
         return
@@ -103,7 +107,7 @@ def judged_cells(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedCells]:
             grid=sample_grid(),
             rounds=_ROUNDS,
         )
-        yield JudgedCells(level, index, found.contrast, enough)
+        yield JudgedCells(pattern, level, index, found.contrast, enough)
 
 
 def _side_of_middle(evidence: Evidence, pattern: Pattern, seen: Tensor) -> float:

@@ -1,7 +1,7 @@
 """Lattices as programs: the sketch, its numbers as a basis, and which of its cells a picture shows."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -103,6 +103,23 @@ def reduce_basis(basis: np.ndarray) -> np.ndarray:
     if u[0] * v[1] - u[1] * v[0] < 0:
         v = -v
     return np.stack([u, v])
+
+
+def in_shortest_steps(pattern: Pattern) -> Pattern:
+    """The same points under the shortest basis, their indices counted from 0: what lattices are judged in.
+
+    `pattern` is of rows of rows, in which steps ever they were written; its own `program` keeps these. One
+    that is in these steps already stays as it is.
+    """
+    lattice = Lattice.of(pattern, pattern.theta)
+    basis = reduce_basis(lattice.basis)
+    change = np.round(lattice.basis @ np.linalg.inv(basis))
+    if np.isclose(np.square(basis).sum(), np.square(lattice.basis).sum(), rtol=1e-9):
+        return pattern
+    index = pattern.index.double() @ torch.from_numpy(change)
+    first = index.amin(0)
+    moved = Lattice(lattice.rx_deg, lattice.ry_deg, basis, lattice.origin + first.numpy() @ basis)
+    return replace(pattern, theta=moved.theta(pattern), index=(index - first).long())
 
 
 def cells_in_view(

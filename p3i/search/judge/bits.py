@@ -17,24 +17,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from p3i.grammar.ast import Polar, Program
-from p3i.grammar.leaves import leaves
 from p3i.interp.compile import compile
 from p3i.interp.pattern import without_doubles
-from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.fit.judged import sweeps_cells
+from p3i.search.forms.lattice import in_shortest_steps
+from p3i.search.forms.length import NUMBER_BITS, cost_bits
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import MOST_FALSE_ALARMS, recurrence_bits
 from p3i.search.look.thinned import thinned
 
-# A length or an angle is written in this many bits: on the largest map, of 640 pixels, so many places lie 5
-# pixels apart, a quarter of the step of what can be seen. A bound or a number of a guard in that many.
-NUMBER_BITS = 7.0
-_WHOLE_BITS = 5.0
-# A loop, a guard, a circular coordinate: which of the productions.
-_PRODUCTION_BITS = 2.0
 # More objects than this are judged by a part of them.
 _MOST_JUDGED = 200
 
@@ -76,38 +69,16 @@ def explained_bits(evidence: Evidence, answer: Answer) -> float:
 def explained(evidence: Evidence, answer: Answer) -> Explained:
     """What a program explains of the photo; nothing where fewer than two of its objects are in sight."""
     pattern = without_doubles(compile(answer.program))
+    cells = sweeps_cells(pattern)
+    pattern = in_shortest_steps(pattern) if cells else pattern
     focal_mm = answer.focal_mm or evidence.focal_mm
     index = pattern.index[evidence.in_sight(pattern, focal_mm=focal_mm)].double()
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return Explained(-cost, cost, len(index))
     judged = index[thinned(index, _MOST_JUDGED)]
-    cells = sweeps_cells(pattern)
     saved = recurrence_bits(evidence, pattern, judged, focal_mm=focal_mm, cells=cells)
     return Explained(saved * len(index) / len(judged) - cost, cost, len(index))
-
-
-def cost_bits(program: Program) -> float:
-    """The bits that a program takes to write down."""
-    parts = nest(program)
-    bits = _PRODUCTION_BITS * (1 + len(parts.guards) + (parts.for_i is not None) + (parts.for_j is not None))
-    for form in (parts.draw.x, parts.draw.y):
-        bits += _PRODUCTION_BITS * isinstance(form, Polar)
-    shared: set[tuple[str, float]] = set()
-    for path, value in leaves(program).items():
-        if value == 0:
-            continue
-        if not path.startswith(("camera.", "draw.")):
-            bits += _WHOLE_BITS
-            continue
-        # A circle's radius and angle stand in x and in y and are one number.
-        name = path.replace("draw.y.", "draw.x."), value
-        if ".radius." in path or ".angle." in path:
-            if name in shared:
-                continue
-            shared.add(name)
-        bits += NUMBER_BITS
-    return bits
 
 
 def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:

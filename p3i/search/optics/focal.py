@@ -28,6 +28,7 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
+from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.look.thinned import thinned
 from p3i.search.result import FOCAL_REASONS, FocalSource
 from p3i.size import Size
@@ -106,7 +107,7 @@ def estimate_focal(program: Program, *, size: Size, focal_mm: float) -> FocalEst
     parts = nest(program)
     if parts.for_i is None or parts.for_j is None or not isinstance(parts.draw.x, Affine):
         return FocalEstimate(None, "only a lattice of two directions can fix it so")
-    pattern = compile(program)
+    pattern = in_shortest_steps(compile(program))
     covariance = _covariance(pattern, size=size, focal_mm=focal_mm)
     if covariance is None:
         return FocalEstimate(None, _TOO_FLAT)

@@ -201,6 +201,30 @@ def test_a_known_cell_makes_the_view_metric_whatever_the_focal() -> None:
         assert np.linalg.det(found.view.view_from_plane[:2, :2]) > 0
 
 
+ROWS = """SetCameraPose(rx=-30, ry=4)
+for i in range(-2, 3):
+    for j in range(-2, 3):
+        Draw(x={}, y={})
+"""
+
+
+@pytest.mark.parametrize(
+    ("draw", "along", "down"),
+    [
+        (("12*i + 6*j", "0.2*i + 4*j"), (1, 0), (-1, 2)),
+        (("6*i", "-4*i + 8*j"), (2, 1), (0, 1)),
+    ],
+)
+def test_the_cell_of_bricks_is_as_wide_as_a_brick_and_as_high_as_a_row(draw, along, down) -> None:
+    found = rectify(
+        blank(), loads(ROWS.format(*draw)), cell=CellSize(240, 80) if along == (1, 0) else CellSize(80, 240)
+    )
+    basis = found.view.placed.basis @ found.view.view_from_plane[:2, :2].T * found.view.mm_per_px
+    sides = np.array([along, down]) @ basis
+    wide, high = (240, 160) if along == (1, 0) else (160, 240)
+    np.testing.assert_allclose(np.abs(sides), [[wide, 0], [0, high]], atol=0.5)
+
+
 @pytest.mark.parametrize(
     ("text", "sides"), [("600x300mm", (600, 300)), ("2x1 ft", (609.6, 304.8)), ("5x4", (5, 4))]
 )

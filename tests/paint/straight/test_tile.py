@@ -73,6 +73,25 @@ def test_the_smallest_rectangle_of_a_lattice(basis: list[list[float]], cells: in
     np.testing.assert_allclose(found.steps @ np.array(basis), found.sides)
 
 
+@pytest.mark.parametrize("slip", [0.0, 0.06, -0.06, 0.2])
+def test_the_tile_of_a_honeycomb_stands_as_the_honeycomb_does(slip: float) -> None:
+    basis = np.array([[10.826, -slip], [5.413, 9.375]])
+    found = supercell(basis)
+    assert found.cells == 2
+    assert found.steps.tolist() == [[1, 0], [-1, 2]]
+
+
+def test_the_tile_of_a_chessboard_stands_on_the_rows_that_its_program_has() -> None:
+    rows = supercell(np.array([[10.0, 0.1], [5.0, 5.0]]))
+    assert rows.steps.tolist() == [[1, 0], [-1, 2]] and rows.cells == 2
+    columns = supercell(np.array([[5.0, -5.0], [0.1, 10.0]]))
+    assert columns.steps.tolist() == [[2, 1], [0, 1]] and columns.cells == 2
+    diagonals = supercell(np.array([[5.0, -5.0], [5.0, 5.0]]))
+    assert diagonals.cells == 1
+    sheared = supercell(np.array([[5.0, 0.0], [5.0, 5.0]]))
+    assert sheared.cells == 1
+
+
 def test_a_lattice_without_a_rectangle_gets_the_nearest_and_says_how_skewed() -> None:
     found = supercell(np.array([[9, 0], [6.5, 4.4]]))
     assert not found.rectangular and found.cells <= 4

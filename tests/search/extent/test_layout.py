@@ -13,8 +13,9 @@ from p3i.grammar.parser import parse
 from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera, project
 from p3i.interp.unroll import points
-from p3i.search.extent.layout import Layout, filling_layout, found_layout, layout_fit, refitted, strict_layout
+from p3i.search.extent.layout import filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.forms.lattice import Lattice
+from p3i.search.forms.layout import Layout
 
 whole = st.integers(-6, 6)
 guards = st.tuples(st.integers(-3, 3), st.integers(-3, 3), whole).filter(lambda guard: guard[:2] != (0, 0))
@@ -135,8 +136,9 @@ def test_the_layout_of_the_truth_is_the_truth(seed: int) -> None:
     scene = small_scene(seed)
     ground = torch.from_numpy(scene.index).double()
     off = lattice_of(scene.program).moved_to(np.array([0.3, -0.2]))
-    layout = found_layout(evidence_of(scene), off, ground)
-    assert layout is not None
+    found = found_layout(evidence_of(scene), off, ground)
+    assert found is not None
+    layout, _ = found
     drawn = np.array([(x, y) for x, y, _, _ in points(layout.program())])
     seen, _ = project(scene.camera.image_from_plane(scene.size), torch.from_numpy(drawn))
     apart = np.linalg.norm(scene.centers_px[:, None] - seen.numpy()[None], axis=2)

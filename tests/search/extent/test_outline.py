@@ -44,6 +44,14 @@ def test_a_diamond_with_a_flat_side_is_three_guards():
     assert np.array_equal(cells_of(outline, 20, 20), evidence > 0)
 
 
+def test_ranges_reach_no_farther_than_the_guards_leave_cells():
+    evidence = evidence_of(20, 20, lambda i, j: (i + j >= 30) & (i - j >= -3) & (j - i >= -3))
+    outline = best_outline(evidence)
+    held = cells_of(outline, 20, 20)
+    assert outline.i_range == (np.flatnonzero(held.any(0))[0], 20)
+    assert outline.j_range == (np.flatnonzero(held.any(1))[0], 20)
+
+
 def test_a_single_missing_object_is_drawn_all_the_same():
     evidence = evidence_of(8, 8, lambda i, j: (i < 6) & (j < 6))
     evidence[2, 3] = evidence[4, 4] = -3

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from p3i.search.extent.presence import find_extent
+from p3i.search.extent.presence import cells_that_hold
 
 RECTANGLE = [(i, j) for i in range(6) for j in range(8)]
 TRIANGLE = [(i, j) for i in range(6) for j in range(6) if i + j >= 5]
@@ -20,7 +20,8 @@ def extent_of(scene, **changes):
         "origin": scene.origin,
         **changes,
     }
-    return find_extent(**given)
+    cells = cells_that_hold(**given)
+    return None if cells is None else cells.outline()
 
 
 def cells_of(extent, scene, origin=None):

@@ -14,7 +14,8 @@ from p3i.grammar.leaves import leaves
 from p3i.grammar.parser import parse
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.judge.bits import by_explained, cost_bits, explained, explained_bits
+from p3i.search.forms.length import cost_bits
+from p3i.search.judge.bits import by_explained, explained, explained_bits
 from p3i.search.look.evidence import Evidence
 
 RING = DrawnRing()

@@ -10,10 +10,12 @@ from columns import two_kinds_of_columns
 from truth import SMALL, evidence_of, small_scene
 
 from p3i.errors import ProgramError
-from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, Polar, Program
+from p3i.grammar.ast import Affine, CameraPose, Draw, For, Header, If, Polar, Program
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
+from p3i.search.judge.bits import explained
 from p3i.search.judge.evaluate import evaluate
 from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import Evidence
@@ -40,6 +42,26 @@ def test_the_true_program_scores_high_and_a_wrong_one_low() -> None:
     camera = scene.program.camera
     flat = replace(scene.program, camera=CameraPose(camera.rx_deg + 25, camera.ry_deg - 30))
     assert evaluate(scene.image(), flat, CONFIG).normalised < 0.15
+
+
+def test_a_score_is_of_the_objects_whatever_steps_they_are_written_in() -> None:
+    scene = small_scene(16)
+    whole = replace(scene.program, header=None)
+    world = whole.world
+    assert isinstance(world, For) and isinstance(world.body, For) and isinstance(world.body.body, Draw)
+    draw, across, down = world.body.body, int(world.stop.constant), int(world.body.stop.constant)
+    assert isinstance(draw.x, Affine) and isinstance(draw.y, Affine)
+    # j becomes i + j, so that i runs along the other diagonal, and two guards hold the same cells.
+    sheared = Draw(*(Affine(one.i - one.j, one.j, one.constant) for one in (draw.x, draw.y)))
+    guarded = If(Affine(-1, 1, 0), If(Affine(1, -1, down - 1), sheared))
+    inner = For("j", Affine(), Affine(constant=across + down), guarded)
+    other = replace(whole, world=replace(world, body=inner))
+    assert len(points(other)) == len(points(whole))
+    scores = [evaluate(scene.image(), program, CONFIG).normalised for program in (whole, other)]
+    assert scores[0] == pytest.approx(scores[1], abs=1e-6)
+    told = [Answer(program, "lattice", 1.0, 0.0) for program in (whole, other)]
+    bits = [explained(evidence_of(scene), answer) for answer in told]
+    assert bits[0].bits + bits[0].cost == pytest.approx(bits[1].bits + bits[1].cost)
 
 
 def test_a_shifted_program_scores_as_high_but_one_at_twice_the_step_does_not() -> None:

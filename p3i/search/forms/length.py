@@ -1,0 +1,36 @@
+"""The description length of programs and sketches: what it takes to write one down, in bits."""
+
+from p3i.grammar.ast import Polar, Program
+from p3i.grammar.leaves import leaves
+from p3i.interp.unroll import nest
+
+NUMBER_BITS = 7.0
+"""A length or an angle: on the largest map, of 640 pixels, so many places lie 5 pixels apart, a quarter of
+the step of what can be seen."""
+WHOLE_BITS = 5.0
+"""A bound, or a number of a guard."""
+PRODUCTION_BITS = 2.0
+"""A loop, a guard, a circular coordinate: which of the productions."""
+
+
+def cost_bits(program: Program) -> float:
+    """The bits that a program takes to write down."""
+    parts = nest(program)
+    bits = PRODUCTION_BITS * (1 + len(parts.guards) + (parts.for_i is not None) + (parts.for_j is not None))
+    for form in (parts.draw.x, parts.draw.y):
+        bits += PRODUCTION_BITS * isinstance(form, Polar)
+    shared: set[tuple[str, float]] = set()
+    for path, value in leaves(program).items():
+        if value == 0:
+            continue
+        if not path.startswith(("camera.", "draw.")):
+            bits += WHOLE_BITS
+            continue
+        # A circle's radius and angle stand in x and in y and are one number.
+        name = path.replace("draw.y.", "draw.x."), value
+        if ".radius." in path or ".angle." in path:
+            if name in shared:
+                continue
+            shared.add(name)
+        bits += NUMBER_BITS
+    return bits
