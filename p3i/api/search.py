@@ -198,13 +198,13 @@ def examples(
 def without(
     image: "Image", *, mask: "str | os.PathLike[str] | np.ndarray | None", roi: Polygon | None
 ) -> "Image":
-    """`image` with what `mask` (bool [H, W], or a file) marks and what lies outside `roi` made unknown."""
+    """`image` with what `mask` (bool [H, W], or a file) marks made unknown, looked at in `roi` only."""
     if mask is None and roi is None:
         return image
     import cv2
     import numpy as np
 
-    from p3i.vision.image import masked, read_mask
+    from p3i.vision.image import masked, read_mask, within
 
     if isinstance(mask, str | os.PathLike):
         image = masked(image, read_mask(mask, image.size))
@@ -219,7 +219,7 @@ def without(
         # OpenCV counts in whole numbers; beyond a picture's largest side a corner's place is all the same.
         corners = np.clip(np.round(np.array(roi)), -(2**20), 2**20).astype(np.int32)
         cv2.fillPoly(inside, [corners], 1)
-        image = masked(image, inside == 0)
+        image = within(image, inside == 1) if inside.any() else masked(image, inside == 0)
     if not image.valid.any():
         raise UsageError("mask and region of interest leave nothing of the photo")
     return image

@@ -83,16 +83,19 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout
 
     None where no object is seen.
     """
-    image = evidence.image
-    matrix = image_from_plane(
-        lattice.rx_deg, lattice.ry_deg, size=image.size, focal_mm=evidence.focal_mm
-    ).numpy()
+    image = evidence.part.image
+    seen = image_from_plane(
+        lattice.rx_deg, lattice.ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm
+    )
+    matrix = (evidence.part.from_photo @ seen).numpy()
     support = _painted(evidence, ground, matrix, lattice)
     origin = find_phase(image.pixels, image.valid, matrix, lattice.basis, support)
     if origin is None:
         return None
     lattice = Lattice(lattice.rx_deg, lattice.ry_deg, lattice.basis, origin)
-    found = find_extent(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
+    found = find_extent(
+        image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support, roi=image.roi
+    )
     if found is None or min(np.diff(found.i_range)[0], np.diff(found.j_range)[0]) < 2:
         return None  # one row fixes no plane
     return Layout(lattice, found.i_range, found.j_range, found.guards)
@@ -189,8 +192,8 @@ def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> floa
 
 
 def _painted(evidence: Evidence, cells: Tensor, matrix: np.ndarray, lattice: Lattice) -> np.ndarray:
-    """Where the cells [N, 2] lie in the photo: bool [H, W]."""
-    size = evidence.image.size
+    """Where the cells [N, 2] lie in what is looked at: bool [H, W]."""
+    size = evidence.part.size
     canvas = np.zeros((size.height, size.width), np.uint8)
     points, _ = cell_corners(matrix @ lattice.plane_from_index, cells)
     for polygon in np.round(points).astype(np.int32):

@@ -24,6 +24,7 @@ _SLACK = 0.09  # of a period: how far an object may lie from its place
 _FAILS, _PASSES = 0.3, 0.7  # of the scaled agreement: below no object, above surely one
 _MISSES = (0.04, 0.1, 0.2, 0.35, 0.5)  # shares of objects that do not look like the others
 _STRAYS = (0.02, 0.06, 0.15)  # shares of other things that do
+_NOTHING = float(np.log(_MISSES[0]))  # the log-odds of a cell that is none, about
 _LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
 
@@ -35,12 +36,15 @@ def find_extent(
     basis: Array,
     origin: Array,
     support: NDArray | None = None,
+    *,
+    roi: Mask | None = None,
 ) -> Outline | None:
     """The outline of the cells of a lattice that hold an object in a photo; None where none is seen to.
 
     Convention: pixels [H, W, 3] RGB in 0..1, valid [H, W]; `image_from_plane` 3x3 maps plane points in front
     of the camera to positive third coordinates; basis [2, 2] has rows u, v and origin [2] is the middle of an
-    object, all in plane coordinates; support [H, W], boolean or in 0..1, may be rough.
+    object, all in plane coordinates; support [H, W], boolean or in 0..1, may be rough. A cell whose middle
+    lies outside `roi` [H, W] holds nothing, whatever is there.
     """
     small, mask, matrix = working_size(pixels, valid, image_from_plane)
     if support is not None and support.shape != mask.shape:
@@ -49,6 +53,9 @@ def find_extent(
     if alike is None or alike.level <= 0:
         return None
     evidence = _evidence(alike, mask.shape)
+    if roi is not None:
+        outside = _outside(alike, roi, roi.shape[1] / mask.shape[1])
+        evidence = np.where(outside, min(float(evidence.min()), _NOTHING), evidence)
     box = alike.sheet.box
     grid = evidence.reshape(box.rows, box.columns)
     return best_outline(grid, i_start=box.i_start, j_start=box.j_start)
@@ -68,6 +75,16 @@ def _middle_shows(alike: Alike, shape: tuple[int, int]) -> Mask:
     shorter = cell_sides_px(alike.image_from_cells, points)[1]
     inside = (at[:, 0] >= 0) & (at[:, 0] <= shape[1] - 1) & (at[:, 1] >= 0) & (at[:, 1] <= shape[0] - 1)
     return front & inside & (shorter >= _SMALLEST_PX)
+
+
+def _outside(alike: Alike, roi: Mask, scale: float) -> Mask:
+    """Which cells [N] have their middle outside a region [H, W], `scale` of whose pixels are one here."""
+    i, j = _indices(alike)
+    at, front = project(alike.image_from_cells, np.stack([i, j], axis=-1).astype(float))
+    x, y = np.round((np.nan_to_num(at).clip(-1e6, 1e6) + 0.5) * scale - 0.5).astype(int).T
+    height, width = roi.shape
+    inside = front & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return ~(inside & roi[y.clip(0, height - 1), x.clip(0, width - 1)])
 
 
 def _evidence(alike: Alike, shape: tuple[int, int]) -> Array:

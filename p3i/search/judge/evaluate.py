@@ -125,7 +125,7 @@ def _equation2(
 ) -> tuple[float, int]:
     """The loss as printed, on the features of the fine map, and the number of its pairs."""
     features = evidence.features(FINE)
-    at, _ = project(features.map_from_photo, points)
+    at, _ = project(features.map_from_photo @ evidence.part.from_photo, points)
     known = seen & sample_valid(features.valid, at.float())
     pairs = pattern.edges[known[pattern.edges].all(1)]
     values = sample(features.values, at.float())
