@@ -11,6 +11,7 @@ from p3i.grammar.printer import format_program
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.asked import asked_for, check_asked, needed_for, stated_focal, walk, why_not
+from p3i.search.closer import looked_closer
 from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
 from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
@@ -75,7 +76,12 @@ def _searched(
     width, height = image.size.width, image.size.height
     session.record("photo", width=width, height=height, focal=assumed[0], version=TRACE_VERSION)
     answers = _found(session) if config.lens is None else _found_with_lens(session)
-    return session.completed(lambda: _result(session, answers, assumed=assumed))
+    result = session.completed(lambda: _result(session, answers, assumed=assumed))
+    closer = looked_closer(session) if result.program is None else None
+    if closer is None:
+        return result
+    seen = session.completed(lambda: _result(*closer, assumed=assumed))
+    return result if seen.program is None else seen
 
 
 def _result(
@@ -260,7 +266,7 @@ def _hopeless(image: Image) -> StopReason | None:
     """Why a picture is not worth a search, if so."""
     if min(image.size.width, image.size.height) < _LEAST_SIDE:
         return StopReason.TOO_SMALL
-    if float(image.valid.mean()) < _LEAST_KNOWN:
+    if float(image.valid[... if image.roi is None else image.roi].mean()) < _LEAST_KNOWN:
         return StopReason.TOO_LITTLE_KNOWN
     step = max(1, image.size.longer // FINE)
     grey = image.pixels[::step, ::step].mean(2)[image.valid[::step, ::step]]

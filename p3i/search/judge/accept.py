@@ -12,6 +12,7 @@ agree well. A program's cost stays in its bits, though `tests` counts many of th
 what the refinement moves between the points of the grids, and for what pictures have and noise has not.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -32,6 +33,15 @@ ends of i and of j among the 160 cells of the least size that a map has room for
 refinement adds, are paid by the program's cost. Rings and hybrids have no figure: on pictures without a
 pattern they explain up to 230 bits, so noise of independent samples says nothing of them.
 """
+
+
+def chosen_among(ways: int, answer: Answer) -> Answer:
+    """An answer, whose `worth` is in bits, that was found where one of so many `ways` to look was chosen.
+
+    As many times more programs were within reach, so its bits are fewer by the logarithm of that, for every
+    rule.
+    """
+    return replace(answer, worth=answer.worth - math.log2(ways))
 
 
 def false_alarms(structure: StructureFound, bits: float) -> float | None:

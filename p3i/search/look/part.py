@@ -25,6 +25,16 @@ class Box:
     right: int
     bottom: int
 
+    @property
+    def width(self) -> int:
+        """In pixels."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> int:
+        """In pixels."""
+        return self.bottom - self.top
+
     @classmethod
     def around(cls, where: NDArray[np.bool_]) -> "Box":
         """The least box that holds all that is set in `where` [H, W]; something is."""
