@@ -1,4 +1,4 @@
-"""Searching and measuring: `synth`, `score`, `trace`, `eval_set`, `examples`, and the reading of photos."""
+"""Searching and measuring: `synth`, `synth_all`, `score`, `trace`, `eval_set`, `examples`; photos read."""
 
 import dataclasses
 import math
@@ -66,14 +66,73 @@ def synth(
     Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
     UsageError for options that cannot be, FileError for a photo or mask that cannot be read.
     """
-    for name, reader in (("sketch", load_sketch), ("start", read_program)):
-        if isinstance(options.get(name), str | os.PathLike):
-            options[name] = reader(options[name])
-    config = changed(config or SearchConfig(), options, verb="synth")
+    asked = _asked(config, options, verb="synth")
     from p3i.search.synthesize import synthesize
 
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
-    result = synthesize(without(image, mask=mask, roi=roi), config, progress=progress, trace=trace)
+    result = synthesize(without(image, mask=mask, roi=roi), asked, progress=progress, trace=trace)
+    return _told(result, photo, image, beside=beside)
+
+
+def synth_all(
+    photo: "str | os.PathLike[str] | Image",
+    config: SearchConfig | None = None,
+    *,
+    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
+    roi: Polygon | None = None,
+    max_px: int | None = None,
+    beside: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    trace: Trace | None = None,
+    **options: Any,
+) -> tuple[SynthesisResult, ...]:
+    """Find every pattern on `photo`: the results of `synth` for one after another, what the earlier ones
+    explain made unknown. The first is the answer of `synth`; where that is a refusal, it is the only one.
+
+    Everything else is as in `synth`; `time_s` is for all together. Raises UsageError, too, for a sketch, a
+    start or the paper's recipe, and for more than one candidate, which all speak of one pattern.
+    """
+    asked = _asked(config, options, verb="synth_all")
+    check_all(asked)
+    from p3i.search.several import all_patterns
+    from p3i.search.synthesize import synthesize
+
+    image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
+    results = all_patterns(
+        without(image, mask=mask, roi=roi),
+        asked,
+        lambda seen, left: synthesize(seen, left, progress=progress, trace=trace),
+    )
+    return tuple(_told(result, photo, image, beside=beside) for result in results)
+
+
+def check_all(config: SearchConfig) -> None:
+    """Raise UsageError for options that speak of one pattern, where all are asked for."""
+    one = {"sketch": config.sketch, "start": config.start, "exhaustive": config.exhaustive_s}
+    named = [name for name, value in one.items() if value is not None]
+    named += ["recipe paper"] if config.recipe == "paper" else []
+    named += ["top"] if config.top > 1 else []
+    named += ["extent image"] if config.extent_used == "image" and config.recipe != "paper" else []
+    if named:
+        raise UsageError(f"--{named[0]} speaks of one pattern, --all of every one: leave one out")
+
+
+def _asked(config: SearchConfig | None, options: dict[str, Any], *, verb: str) -> SearchConfig:
+    """`config` changed by `options`, whose sketch and start may be paths."""
+    for name, reader in (("sketch", load_sketch), ("start", read_program)):
+        if isinstance(options.get(name), str | os.PathLike):
+            options[name] = reader(options[name])
+    return changed(config or SearchConfig(), options, verb=verb)
+
+
+def _told(
+    result: SynthesisResult,
+    photo: "str | os.PathLike[str] | Image",
+    image: "Image",
+    *,
+    beside: str | os.PathLike[str] | None,
+) -> SynthesisResult:
+    """A result with what the reading of its photo remarked, and with headers."""
     name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
     heard = tuple(note for note in image.notes if note not in result.notes)
     result = dataclasses.replace(result, notes=heard + result.notes)

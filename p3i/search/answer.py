@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from p3i.grammar.ast import Program
-from p3i.search.result import StructureFound
+from p3i.search.result import Other, StructureFound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -14,6 +14,7 @@ class Answer:
     (comparable between programs for one photo). `focal_mm` is the focal that the program is told with, None
     where it is the one assumed; then `focal_reason` may say why no other was found. `lens_k1` is the radial
     distortion of the photo that the program holds on (p3i/interp/lens.py), None for a pinhole camera.
+    `others` are the patterns beside this one that were met on the way to it.
     """
 
     program: Program
@@ -24,3 +25,4 @@ class Answer:
     focal_mm: float | None = None
     focal_reason: str = ""
     lens_k1: float | None = None
+    others: tuple[Other, ...] = ()

@@ -10,7 +10,7 @@ from p3i.search.extent.primitive import primitive
 from p3i.search.fit.grow import Fit, follow, grow
 from p3i.search.forms.guess import Proposal
 from p3i.search.forms.lattice import Lattice, lattice_pattern, map_from_index
-from p3i.search.judge.elsewhere import with_note_of_others
+from p3i.search.judge.elsewhere import with_others
 from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
@@ -56,7 +56,7 @@ def find_lattices(session: Session) -> list[Answer]:
         _finish_all(session, pattern, fits[:1], answers)
     answers.sort(key=lambda answer: -answer.worth)
     with session.until_interrupted():
-        return with_note_of_others(session, pattern, fits, answers, finish=_finished)
+        return with_others(session, pattern, fits, answers, finish=_finished)
     return answers
 
 

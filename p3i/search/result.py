@@ -74,6 +74,30 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Other:
+    """Another pattern on the photo, beside the answer's: what would be an answer by itself.
+
+    `center` is the middle of its `objects`, (x, y) in pixels, `region` as in SynthesisResult.
+    """
+
+    structure: StructureFound
+    center: tuple[float, float]
+    region: tuple[tuple[float, float], ...]
+    objects: int
+    score: float
+
+    def record(self) -> dict[str, Any]:
+        """The pattern as JSON has it."""
+        return {
+            "structure": self.structure,
+            "center": [round(value, 1) for value in self.center],
+            "region": [[round(x, 1), round(y, 1)] for x, y in self.region],
+            "objects": self.objects,
+            "score": _rounded(self.score),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisResult:
     """The answer for one photo.
 
@@ -93,6 +117,10 @@ class SynthesisResult:
     plane's normal; None without a program.
     `mirrored` is the other tilt, (rx, ry) in degrees, that a ring's objects fit about as well, None where the
     two can be told apart.
+    `others` are further patterns that the search met beside the answer's, the most worth first: not all that
+    there are, which `p3i.synth_all` looks for.
+    `least_period_px` of a photo that was refused: what repeats more closely than so many pixels was too small
+    to be seen, since the photo is looked at reduced; None where nothing was.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
     """
 
@@ -114,18 +142,23 @@ class SynthesisResult:
     seed: int = 0
     pose_sigma_deg: float | None = None
     mirrored: tuple[float, float] | None = None
+    others: tuple[Other, ...] = ()
+    least_period_px: int | None = None
     notes: tuple[str, ...] = ()
 
     @property
     def reason(self) -> str:
         """Why the search ended, as a sentence with its numbers; empty where there is nothing to explain."""
+        why = self.stop.value
         if (
             self.stop in (StopReason.NO_PATTERN, StopReason.NO_FIT)
             and self.score is not None
             and self.needed is not None
         ):
-            return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
-        return self.stop.value
+            why = f"{why} (best {self.score:.2f}, needs {self.needed:.2f})"
+        if self.least_period_px is None or self.program is not None:
+            return why
+        return f"{why}; repeats of less than {self.least_period_px} pixels are not seen: --roi looks closer"
 
     def record(self, *, image: str | None = None, seconds: float | None = None) -> dict[str, Any]:
         """The answer as JSON has it, a line of `p3i synth --format jsonl`; its keys in the documented order.
@@ -168,6 +201,8 @@ class SynthesisResult:
             "features": self.features,
             "seed": self.seed,
         }
+        if self.others:
+            record["others"] = [other.record() for other in self.others]
         if len(self.candidates) > 1:
             record["candidates"] = [candidate.record() for candidate in self.candidates]
         return record

@@ -105,7 +105,9 @@ def _result(
         reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
         if session.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
-        refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
+        least = session.evidence.least_period_px
+        stop = session.stopped or reason
+        refused = _told(config, assumed, None, stop, score=best, needed=needed, least_period_px=least)
         session.record("answer", program=None, score=best, reason=refused.reason)
         return refused
     good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
@@ -152,6 +154,7 @@ def _result(
         lens_k1=first.lens_k1,
         pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
+        others=first.others,
         notes=notes,
         **_focal_facts(first, assumed),
     )

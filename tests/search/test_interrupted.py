@@ -129,7 +129,7 @@ class Said(Once):
 
 
 IN_A_CALL = [
-    ("lattice", "lattices.with_note_of_others", 1),
+    ("lattice", "lattices.with_others", 1),
     ("ring", "rings.ring_fit", 2),
     ("ring", "rings._extended", 1),
     ("ring", "rings.places", 2),

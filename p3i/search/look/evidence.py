@@ -28,6 +28,8 @@ FINE = 640
 _BLUR_SHARE = 0.1
 # Colours are not reduced below this many pixels on the longer side.
 _SMALLEST_MAP = 96
+# What repeats at fewer pixels of the fine map than so many is not seen (docs/search.md).
+_LEAST_PERIOD = 8.0
 # Cells narrower than this on the coarse map are looked at on the fine one.
 _LEAST_COARSE_CELL = 24.0
 
@@ -169,6 +171,12 @@ class Evidence:
         size = self.image.size
         points, in_front = pattern.centers_px(theta, size=size, focal_mm=focal_mm or self.focal_mm)
         return in_front & self.part.shows(points)
+
+    @property
+    def least_period_px(self) -> int | None:
+        """Steps of fewer photo pixels are too small for the finest map; None where that is not reduced."""
+        reduced = self.part.size.longer / FINE
+        return math.ceil(_LEAST_PERIOD * reduced) if reduced > 1 else None
 
     @property
     def frame(self) -> Level:
