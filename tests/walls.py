@@ -34,7 +34,7 @@ class Wall:
 
 
 def hall(size: tuple[int, int], *walls: Wall, things: int = 40, seed: int = 3) -> Image:
-    """A photo of `size` (width, height): a mottled ground, so many things of no order, and walls upon them."""
+    """A photo of `size` (width, height): a mottled ground, so many things, walls upon them."""
     chance, (width, height) = np.random.default_rng(seed), size
     pixels = np.full((height, width, 3), 0.55, np.float32)
     for grain, strength in ((200, 0.08), (60, 0.05), (12, 0.03)):

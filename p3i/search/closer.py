@@ -3,7 +3,8 @@
 The maps of the first look have 640 pixels at most, so a pattern that fills a fifth of a large photo shows few
 pixels a cell, and counts little beside cars and trees. The windows of the first look say where something
 repeats; the part of half the photo's sides that holds most of that is searched once more, with lattices only,
-as a region of interest would be. The choice among the parts is paid in bits.
+as a region of interest would be. The choice among the parts is paid in bits, and bits alone convince: a score
+says how alike a few cells are, and some part of any photo has a few that are.
 """
 
 import dataclasses
@@ -17,7 +18,7 @@ from p3i.search.answer import Answer
 from p3i.search.asked import asked_for, needed_for
 from p3i.search.extent.layout import found_layout, layout_fit, refitted
 from p3i.search.forms.lattice import Lattice, lattice_pattern
-from p3i.search.judge.accept import chosen_among
+from p3i.search.judge.accept import beyond_noise, chosen_among
 from p3i.search.judge.bits import by_explained, explained_bits
 from p3i.search.judge.region import region_px
 from p3i.search.lattices import find_lattices
@@ -58,7 +59,8 @@ def looked_closer(session: Session) -> tuple[Session, list[Answer]] | None:
     place = f"{around.width} x {around.height} pixels from ({around.left}, {around.top}) on"
     note = f"found by a closer look at {place}"
     told = [dataclasses.replace(answer, notes=(*answer.notes, note)) for answer in told]
-    return closer, [chosen_among(PLACES**2, answer) for answer in told]
+    chosen = [chosen_among(PLACES**2, answer) for answer in told]
+    return closer, [answer for answer in chosen if beyond_noise(answer.structure, answer.worth)]
 
 
 def promising_part(evidence: Evidence) -> Box | None:
