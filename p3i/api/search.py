@@ -312,6 +312,8 @@ def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) ->
         if margin is not None:
             facts["margin"] = round(margin, 4)
         facts |= {"features": result.features, "focal_from": answer.focal_source, "seed": result.seed}
+        if result.window is not None:
+            facts["window"] = ",".join(map(str, result.window))
         header = Header(
             canvas=(size.width, size.height),
             focal_mm=answer.focal_mm,

@@ -119,6 +119,8 @@ class SynthesisResult:
     two can be told apart.
     `others` are further patterns that the search met beside the answer's, the most worth first: not all that
     there are, which `p3i.synth_all` looks for.
+    `window` is the rectangle (x, y, width, height) of photo pixels that was looked at closer: the box of a
+    region of interest, or the part that the search chose; None for all of it.
     `least_period_px` of a photo that was refused: what repeats more closely than so many pixels was too small
     to be seen, since the photo is looked at reduced; None where nothing was.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
@@ -143,6 +145,7 @@ class SynthesisResult:
     pose_sigma_deg: float | None = None
     mirrored: tuple[float, float] | None = None
     others: tuple[Other, ...] = ()
+    window: tuple[int, int, int, int] | None = None
     least_period_px: int | None = None
     notes: tuple[str, ...] = ()
 
@@ -201,6 +204,8 @@ class SynthesisResult:
             "features": self.features,
             "seed": self.seed,
         }
+        if self.window is not None:
+            record["window"] = list(self.window)
         if self.others:
             record["others"] = [other.record() for other in self.others]
         if len(self.candidates) > 1:

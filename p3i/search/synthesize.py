@@ -155,6 +155,7 @@ def _result(
         pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
         others=first.others,
+        window=session.evidence.part.window,
         notes=notes,
         **_focal_facts(first, assumed),
     )

@@ -67,6 +67,11 @@ class Part:
         return x + self.corner[0], y + self.corner[1]
 
     @property
+    def window(self) -> tuple[int, int, int, int] | None:
+        """The part as (x, y, width, height) of the photo's pixels; None where it is all of the photo."""
+        return None if self.size == self.photo_size else (*self.corner, self.size.width, self.size.height)
+
+    @property
     def from_photo(self) -> Tensor:
         """The matrix [3, 3] (float64) that takes pixels of the photo to pixels of the part."""
         matrix = torch.eye(3, dtype=torch.float64)

@@ -5,6 +5,7 @@ import pytest
 import torch
 from walls import Wall, hall
 
+import p3i
 from p3i.api.search import without
 from p3i.interp.camera import Camera
 from p3i.interp.compile import compile
@@ -33,7 +34,7 @@ def photo() -> Image:
 
 @pytest.fixture(scope="module")
 def closer(photo: Image) -> SynthesisResult:
-    return synthesize(without(photo, mask=None, roi=around(SMALL, 25)), LATTICE)
+    return p3i.synth(photo, LATTICE, roi=around(SMALL, 25))
 
 
 def test_a_small_wall_is_found_within_its_region(closer: SynthesisResult) -> None:
@@ -50,6 +51,14 @@ def test_the_program_is_that_of_the_whole_photo(closer: SynthesisResult, photo: 
     assert np.abs(high - (SMALL.outline.max(0) - 4.5)).max() < 6
     camera = Camera.of(closer.program)
     assert abs(camera.rx_deg) < 45 and abs(camera.ry_deg) < 45
+
+
+def test_the_score_of_the_program_is_what_was_printed(closer: SynthesisResult, photo: Image) -> None:
+    assert closer.program is not None and closer.score is not None
+    box = around(SMALL, 25)
+    assert closer.window is not None and closer.record()["window"] == list(closer.window)
+    assert np.abs(np.array(closer.window[:2]) - box[0]).max() <= 1
+    assert p3i.score(photo, closer.program).normalised == pytest.approx(closer.score, abs=1e-6)
 
 
 def test_nothing_is_drawn_outside_the_region(photo: Image) -> None:
