@@ -10,7 +10,6 @@ from p3i.api.search import (
     Polygon,
     Progress,
     Trace,
-    check_all,
     eval_set,
     examples,
     read_image,
@@ -26,6 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = [  # noqa: RUF022  # in the order of use
     "synth", "synth_all", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score",
-    "check", "format", "expand", "examples", "trace", "eval_set", "check_all",
+    "check", "format", "expand", "examples", "trace", "eval_set",
     "load", "load_sketch", "loads", "dump", "dumps", "read_image", "Polygon", "Progress", "Trace",
 ]  # fmt: skip

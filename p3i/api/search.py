@@ -90,10 +90,11 @@ def synth_all(
     explain made unknown. The first is the answer of `synth`; where that is a refusal, it is the only one.
 
     Everything else is as in `synth`; `time_s` is for all together. Raises UsageError, too, for a sketch, a
-    start or the paper's recipe, and for more than one candidate, which all speak of one pattern.
+    start or the paper's recipe, and for more than one candidate, which all speak of one pattern. `mask` as
+    array is bool [H, W].
     """
     asked = _asked(config, options, verb="synth_all")
-    check_all(asked)
+    asked.check_for_all()
     from p3i.search.several import all_patterns
     from p3i.search.synthesize import synthesize
 
@@ -104,17 +105,6 @@ def synth_all(
         lambda seen, left: synthesize(seen, left, progress=progress, trace=trace),
     )
     return tuple(_told(result, photo, image, beside=beside) for result in results)
-
-
-def check_all(config: SearchConfig) -> None:
-    """Raise UsageError for options that speak of one pattern, where all are asked for."""
-    one = {"sketch": config.sketch, "start": config.start, "exhaustive": config.exhaustive_s}
-    named = [name for name, value in one.items() if value is not None]
-    named += ["recipe paper"] if config.recipe == "paper" else []
-    named += ["top"] if config.top > 1 else []
-    named += ["extent image"] if config.extent_used == "image" and config.recipe != "paper" else []
-    if named:
-        raise UsageError(f"--{named[0]} speaks of one pattern, --all of every one: leave one out")
 
 
 def _asked(config: SearchConfig | None, options: dict[str, Any], *, verb: str) -> SearchConfig:

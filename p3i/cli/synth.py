@@ -113,7 +113,7 @@ class Call:
         read = {name: None if given[name] is None else readers[name](given[name]) for name in readers}
         config = options.chosen(SearchConfig, given, **read)
         if given["every"]:
-            api.check_all(config)
+            config.check_for_all()
         photos = tuple(files.gather(listed(given["images"]), suffixes=SUFFIXES))
         output: str | None = given["output"]
         form = given["form"] or ("jsonl" if output and Path(output).suffix == ".jsonl" else "p3p")
