@@ -48,9 +48,10 @@ def looked_closer(session: Session) -> tuple[Session, list[Answer]] | None:
         return None
     session.tell("looking closer", 0.9)
     session.record("closer", window=dataclasses.astuple(box))
-    found = find_lattices(_through(session, box))
+    closer = _through(session, box)
+    found = find_lattices(closer)
     if not found:
-        return None
+        return closer, []
     around = _with_surroundings(session.evidence, found[0], box)
     closer = _through(session, around)
     if around != box and explained_bits(closer.evidence, found[0]) > 0:
