@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         score,
         show,
         synth,
+        synth_all,
         tile,
         trace,
     )
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     from p3i.options.show import ShowOptions
     from p3i.options.tile import TileOptions
     from p3i.search.config import SearchConfig
-    from p3i.search.result import Candidate, StopReason, SynthesisResult
+    from p3i.search.result import Candidate, Other, StopReason, SynthesisResult
     from p3i.size import Size
     from p3i.vision.image import Image
 
@@ -76,6 +77,7 @@ _HOMES = {
     "loads": "p3i.language",
     "Margins": "p3i.options.extend",
     "NoPatternError": "p3i.errors",
+    "Other": "p3i.search.result",
     "P3IError": "p3i.errors",
     "parse_cell": "p3i.options.rectify",
     "parse_margins": "p3i.options.extend",
@@ -97,6 +99,7 @@ _HOMES = {
     "Sketch": "p3i.grammar.sketch",
     "StopReason": "p3i.search.result",
     "synth": "p3i.api",
+    "synth_all": "p3i.api",
     "SynthesisResult": "p3i.search.result",
     "tile": "p3i.api",
     "TileOptions": "p3i.options.tile",
@@ -105,10 +108,10 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score", "check",
-    "format", "expand", "examples", "trace", "eval_set", "load", "load_sketch", "loads", "dump", "dumps",
-    "read_image", "Program", "Sketch", "Diagnostic", "Image", "Size", "Camera", "SearchConfig",
-    "SynthesisResult", "Candidate", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions",
+    "synth", "synth_all", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score",
+    "check", "format", "expand", "examples", "trace", "eval_set", "load", "load_sketch", "loads", "dump",
+    "dumps", "read_image", "Program", "Sketch", "Diagnostic", "Image", "Size", "Camera", "SearchConfig",
+    "SynthesisResult", "Candidate", "Other", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions",
     "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions", "EditOptions", "CellSize",
     "parse_cell", "Margins", "parse_margins", "P3IError", "UsageError", "FileError", "ProgramError",
     "ParseError", "NoPatternError",

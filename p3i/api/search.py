@@ -1,4 +1,4 @@
-"""Searching and measuring: `synth`, `score`, `trace`, `eval_set`, `examples`, and the reading of photos."""
+"""Searching and measuring: `synth`, `synth_all`, `score`, `trace`, `eval_set`, `examples`; photos read."""
 
 import dataclasses
 import math
@@ -69,15 +69,69 @@ def synth(
     Returns a result whose `program` is None, with a `stop` reason, where no pattern convinces. Raises
     UsageError for options that cannot be, FileError for a photo or mask that cannot be read.
     """
-    for name, reader in (("sketch", load_sketch), ("start", read_program)):
-        if isinstance(options.get(name), str | os.PathLike):
-            options[name] = reader(options[name])
-    config = changed(config or SearchConfig(), options, verb="synth")
+    asked = _asked(config, options, verb="synth")
     from p3i.search.synthesize import synthesize
 
     image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
     seen = without(image, mask=mask, roi=roi)
-    result = synthesize(seen, config, progress=progress, trace=trace)
+    result = synthesize(seen, asked, progress=progress, trace=trace)
+    return _told(result, photo, image, seen, beside=beside)
+
+
+def synth_all(
+    photo: "str | os.PathLike[str] | Image",
+    config: SearchConfig | None = None,
+    *,
+    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
+    roi: Polygon | None = None,
+    max_px: int | None = None,
+    beside: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    trace: Trace | None = None,
+    **options: Any,
+) -> tuple[SynthesisResult, ...]:
+    """Find every pattern on `photo`: the results of `synth` for one after another, what the earlier ones
+    explain made unknown. The first is the answer of `synth`; where that is a refusal, it is the only one.
+
+    Everything else is as in `synth`; `time_s` is for all together. Raises UsageError, too, for a sketch, a
+    start or the paper's recipe, and for more than one candidate, which all speak of one pattern. `mask` as
+    array is bool [H, W].
+    """
+    asked = _asked(config, options, verb="synth_all")
+    asked.check_for_all()
+    from p3i.search.several import all_patterns
+    from p3i.search.synthesize import synthesize
+
+    image = read_image(photo, max_px=max_px) if isinstance(photo, str | os.PathLike) else photo
+    known = without(image, mask=mask, roi=roi)
+    results = all_patterns(
+        known,
+        asked,
+        lambda seen, left: synthesize(seen, left, progress=progress, trace=trace),
+    )
+    return tuple(_told(result, photo, image, known, beside=beside) for result in results)
+
+
+def _asked(config: SearchConfig | None, options: dict[str, Any], *, verb: str) -> SearchConfig:
+    """`config` changed by `options`, whose sketch and start may be paths."""
+    for name, reader in (("sketch", load_sketch), ("start", read_program)):
+        if isinstance(options.get(name), str | os.PathLike):
+            options[name] = reader(options[name])
+    return changed(config or SearchConfig(), options, verb=verb)
+
+
+def _told(
+    result: SynthesisResult,
+    photo: "str | os.PathLike[str] | Image",
+    image: "Image",
+    seen: "Image",
+    *,
+    beside: str | os.PathLike[str] | None,
+) -> SynthesisResult:
+    """A result with what the reading of its photo remarked, with headers, and with what is absent of it.
+
+    `seen` is the photo as it was searched.
+    """
     name = _relative(photo, Path(beside or ".")) if isinstance(photo, str | os.PathLike) else None
     heard = tuple(note for note in image.notes if note not in result.notes)
     result = dataclasses.replace(result, notes=heard + result.notes)
@@ -202,13 +256,13 @@ def examples(
 def without(
     image: "Image", *, mask: "str | os.PathLike[str] | np.ndarray | None", roi: Polygon | None
 ) -> "Image":
-    """`image` with what `mask` (bool [H, W], or a file) marks and what lies outside `roi` made unknown."""
+    """`image` with what `mask` (bool [H, W], or a file) marks made unknown, looked at in `roi` only."""
     if mask is None and roi is None:
         return image
     import cv2
     import numpy as np
 
-    from p3i.vision.image import masked, read_mask
+    from p3i.vision.image import masked, read_mask, within
 
     if isinstance(mask, str | os.PathLike):
         image = masked(image, read_mask(mask, image.size))
@@ -223,7 +277,7 @@ def without(
         # OpenCV counts in whole numbers; beyond a picture's largest side a corner's place is all the same.
         corners = np.clip(np.round(np.array(roi)), -(2**20), 2**20).astype(np.int32)
         cv2.fillPoly(inside, [corners], 1)
-        image = masked(image, inside == 0)
+        image = within(image, inside == 1) if inside.any() else masked(image, inside == 0)
     if not image.valid.any():
         raise UsageError("mask and region of interest leave nothing of the photo")
     return image
@@ -270,6 +324,8 @@ def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) ->
         if margin is not None:
             facts["margin"] = round(margin, 4)
         facts |= {"features": result.features, "focal_from": answer.focal_source, "seed": result.seed}
+        if result.window is not None:
+            facts["window"] = ",".join(map(str, result.window))
         header = Header(
             canvas=(size.width, size.height),
             focal_mm=answer.focal_mm,

@@ -30,6 +30,8 @@ class Task:
     """The folder as seen from which the program's header names the photo."""
     as_record: bool = False
     """Whether the answer is a JSON object instead of texts."""
+    every: bool = False
+    """Whether every pattern of the photo is asked for."""
     raises_bugs: bool = False
     """Whether what nobody foresaw is raised: where no other photo would suffer."""
 
@@ -38,14 +40,16 @@ class Task:
 class Outcome:
     """What came of one photo: a result with its time, or an error with its exit code.
 
-    `texts` are the programs of the result and of the other candidates that were asked for, the best first;
-    `record` is what `--format jsonl` prints, an error included.
+    `more` are the results for further patterns of the photo, where every one is asked for. `texts` are the
+    programs of the result and of the other candidates, or patterns, that were asked for, the best first;
+    `records` is what `--format jsonl` prints, a line each, an error included.
     """
 
     photo: Path
     result: SynthesisResult | None = None
+    more: tuple[SynthesisResult, ...] = ()
     texts: tuple[str, ...] = ()
-    record: Mapping[str, Any] | None = None
+    records: tuple[Mapping[str, Any], ...] = ()
     error: str = ""
     code: int = 0
     seconds: float = 0.0
@@ -69,7 +73,8 @@ def solve(task: Task, *, update: api.Progress, note: Note | None = None) -> Outc
     begun = time.perf_counter()
     seconds: float | None = None
     try:
-        result = api.synth(
+        search = _every if task.every else _one
+        result, *more = search(
             task.photo,
             task.config,
             mask=task.mask,
@@ -81,7 +86,7 @@ def solve(task: Task, *, update: api.Progress, note: Note | None = None) -> Outc
         )
         seconds = time.perf_counter() - begun
         if result.program is not None:
-            return _answer(task, result, seconds=seconds)
+            return _answer(task, result, tuple(more), seconds=seconds)
         code = 130 if result.stop is StopReason.INTERRUPTED else NoPatternError.exit_code
         return failure(task, result.reason, code=code, seconds=seconds)
     except KeyboardInterrupt:
@@ -105,26 +110,51 @@ def failure(task: Task, error: str, *, code: int, seconds: float = 0.0) -> Outco
     record = {"image": name, "program": None, "error": error, "code": code, "seconds": round(seconds, 3)}
     return Outcome(
         photo=task.photo,
-        record=record if task.as_record else None,
+        records=(record,) if task.as_record else (),
         error=error,
         code=code,
         seconds=seconds,
     )
 
 
-def _answer(task: Task, result: SynthesisResult, *, seconds: float) -> Outcome:
-    """A result with a program, put into words. Raises ParseError for one that has none in its layout."""
+def _one(photo: Path, config: SearchConfig, **given: Any) -> tuple[SynthesisResult, ...]:
+    return (api.synth(photo, config, **given),)
+
+
+def _every(photo: Path, config: SearchConfig, **given: Any) -> tuple[SynthesisResult, ...]:
+    return api.synth_all(photo, config, **given)
+
+
+def _answer(
+    task: Task, result: SynthesisResult, more: tuple[SynthesisResult, ...], *, seconds: float
+) -> Outcome:
+    """Results with programs, put into words. Raises ParseError for one that has none in its layout."""
     from p3i.grammar.printer import format_program
 
-    code = 130 if result.stop is StopReason.INTERRUPTED else 0
-    texts, record = (), None
+    results = (result, *more)
+    code = 130 if results[-1].stop is StopReason.INTERRUPTED else 0
+    texts, records = (), ()
     if task.as_record:
-        record = result.record(image=str(task.photo), seconds=seconds)
+        records = tuple(one.record(image=str(task.photo), seconds=seconds) for one in results)
+        if task.every:
+            records = tuple(
+                {**record, "pattern": number, "patterns": len(records)}
+                for number, record in enumerate(records, start=1)
+            )
     elif result.program is not None:
         layout: Literal["python", "table1"] = "table1" if task.config.strict else "python"
         others = [candidate.program for candidate in result.candidates[1 : task.config.top]]
+        others += [one.program for one in more if one.program is not None]
         texts = tuple(format_program(program, layout=layout) for program in (result.program, *others))
-    return Outcome(photo=task.photo, result=result, texts=texts, record=record, code=code, seconds=seconds)
+    return Outcome(
+        photo=task.photo,
+        result=result,
+        more=more,
+        texts=texts,
+        records=records,
+        code=code,
+        seconds=seconds,
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -20,7 +20,7 @@ from p3i.cli.photos import SUFFIXES, parse_roi
 from p3i.cli.solving import Outcome, Task, failure, prepare, solve
 from p3i.errors import P3IError, UsageError
 from p3i.search.config import SearchConfig
-from p3i.search.result import Candidate, StopReason
+from p3i.search.result import StopReason, SynthesisResult
 
 
 @grouped.command("synth")
@@ -37,6 +37,12 @@ from p3i.search.result import Candidate, StopReason
     options.output("Where to write; - is stdout. Several photos need a folder, or --format jsonl."),
     options.force,
     options.of(SearchConfig, "top"),
+    click.option(
+        "--all",
+        "every",
+        is_flag=True,
+        help="Find every pattern, one after another: FILE.p3p, FILE-2.p3p, ...; a line each in jsonl.",
+    ),
     click.option("--trace", type=click.Path(), metavar="FILE", help="Write the search's steps, JSON lines."),
 )
 @grouped.group(
@@ -97,6 +103,8 @@ class Call:
     quiet: bool
     verbose: bool
     errors_as_json: bool
+    every: bool = False
+    """Whether every pattern of a photo is asked for, not the one worth most."""
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Call":
@@ -104,6 +112,8 @@ class Call:
         readers = {"sketch": api.load_sketch, "start": read_program}
         read = {name: None if given[name] is None else readers[name](given[name]) for name in readers}
         config = options.chosen(SearchConfig, given, **read)
+        if given["every"]:
+            config.check_for_all()
         photos = tuple(files.gather(listed(given["images"]), suffixes=SUFFIXES))
         output: str | None = given["output"]
         form = given["form"] or ("jsonl" if output and Path(output).suffix == ".jsonl" else "p3p")
@@ -133,6 +143,7 @@ class Call:
             quiet=given["quiet"],
             verbose=given["verbose"] > 0,
             errors_as_json=given["error_format"] == "json",
+            every=given["every"],
         )
 
 
@@ -211,6 +222,7 @@ def _task(call: Call, photo: Path, target: Path | None) -> Task:
         max_px=call.max_px,
         beside=written_to.parent if written_to else None,
         as_record=call.as_jsonl,
+        every=call.every,
         raises_bugs=len(call.photos) == 1 and not call.as_jsonl,
     )
 
@@ -224,6 +236,11 @@ def _targets(call: Call) -> list[Path | None]:
     names = [photo.stem if stems[photo.stem] == 1 else photo.name for photo in call.photos]
     if twice := [name for name, count in Counter(names).items() if count > 1]:
         raise UsageError(f"two photos would both be written to {call.folder / twice[0]}.p3p")
+    if call.every and (mixed := [name for name in names if _is_further(name, names)]):
+        raise UsageError(
+            f"{call.folder / mixed[0]}.p3p may be a photo's or a further pattern of another's: "
+            "give them folders of their own, or --format jsonl"
+        )
     return [call.folder / f"{name}.p3p" for name in names]
 
 
@@ -262,28 +279,44 @@ def _finish(call: Call, task: Task, outcome: Outcome, *, target: Path | None, li
 def _write(call: Call, outcome: Outcome, target: Path | None, *, lines: IO[str] | None) -> None:
     """Write the answer where it belongs, at once."""
     if call.as_jsonl:
-        text = json.dumps(outcome.record)
+        text = "".join(json.dumps(record) + "\n" for record in outcome.records)
         if lines is None:
-            click.echo(text)
+            click.echo(text, nl=False)
         else:
-            lines.write(text + "\n")
+            lines.write(text)
             lines.flush()
     elif target is None and outcome.result is not None:
-        text = "\n".join(_headed(outcome.texts, outcome.result.candidates))
+        text = "\n".join(_headed(call, outcome))
         click.echo(text.encode("utf-8"), nl=False)  # whatever the locale says
     elif target is not None:
-        for rank, text in enumerate(outcome.texts, start=1):
-            with files.replacing(target if rank == 1 else _ranked(target, rank), force=call.force) as stream:
+        name = _further if call.every else _ranked
+        ranks = range(1, len(outcome.texts) + 1)
+        places = [target if rank == 1 else name(target, rank) for rank in ranks]
+        for place in places:  # all or none
+            files.check_writable(place, force=call.force)
+        for place, text in zip(places, outcome.texts, strict=True):
+            with files.replacing(place, force=call.force) as stream:
                 stream.write(text)
 
 
-def _headed(texts: Sequence[str], candidates: Sequence[Candidate]) -> list[str]:
-    """The texts of several candidates, each under a comment that says which it is; a single one as it is."""
-    if len(texts) < 2:
+def _headed(call: Call, outcome: Outcome) -> list[str]:
+    """The texts of several candidates, or patterns, each under a comment that says which it is.
+
+    A single one is left as it is.
+    """
+    texts, result = outcome.texts, outcome.result
+    if len(texts) < 2 or result is None:
         return list(texts)
+    if call.every:
+        kind, heads = (
+            "pattern",
+            [f"{one.structure}, score {one.score or 0.0:.4f}" for one in (result, *outcome.more)],
+        )
+    else:
+        kind, heads = "candidate", [candidate.title for candidate in result.candidates]
     return [
-        f"# candidate {rank} of {len(texts)}: {candidate.title}\n{text}"
-        for rank, (candidate, text) in enumerate(zip(candidates, texts, strict=False), start=1)
+        f"# {kind} {rank} of {len(texts)}: {head}\n{text}"
+        for rank, (head, text) in enumerate(zip(heads, texts, strict=False), start=1)
     ]
 
 
@@ -294,24 +327,41 @@ def _talk(call: Call, outcome: Outcome) -> None:
         message = outcome.error if as_json or name in outcome.error else f"{name}: {outcome.error}"
         report.line(message, as_json=as_json, code=outcome.code, image=name)
         return
-    result = outcome.result
     if call.quiet:
         return
-    remarks = list(result.notes)
-    if result.stop is not StopReason.FOUND:
-        remarks.append(f"{result.reason}; this is the best program so far")
-    for remark in remarks:
-        message = remark if as_json else f"{name}: {remark}"
-        report.line(message, as_json=as_json, kind="note", image=name)
-    if call.verbose:
-        score = "" if result.score is None else f", score {result.score:.2f}"
-        margin = "" if result.margin is None else f" (margin {result.margin:.2f})"
-        focal = f"focal {result.focal_mm:.4g} mm, {result.focal_reason or result.focal_source}"
-        found = f"{result.structure} of {len(result.centers)} objects{score}{margin}, {focal}"
-        message = f"{name}: {found}, {outcome.seconds:.1f} s"
-        report.line(message, as_json=as_json, kind="info", image=name)
+    results = (outcome.result, *outcome.more)
+    for number, result in enumerate(results, start=1):
+        which = f"pattern {number}: " if len(results) > 1 else ""
+        remarks = list(result.notes)
+        if result.stop is not StopReason.FOUND:
+            remarks.append(f"{result.reason}; this is the best program so far")
+        for remark in remarks:
+            message = which + remark if as_json else f"{name}: {which}{remark}"
+            report.line(message, as_json=as_json, kind="note", image=name)
+        if call.verbose:
+            message = f"{name}: {which}{_found(result)}, {outcome.seconds:.1f} s"
+            report.line(message, as_json=as_json, kind="info", image=name)
+
+
+def _found(result: SynthesisResult) -> str:
+    """What was found, in a few words."""
+    score = "" if result.score is None else f", score {result.score:.2f}"
+    margin = "" if result.margin is None else f" (margin {result.margin:.2f})"
+    focal = f"focal {result.focal_mm:.4g} mm, {result.focal_reason or result.focal_source}"
+    return f"{result.structure} of {len(result.centers)} objects{score}{margin}, {focal}"
 
 
 def _ranked(target: Path, rank: int) -> Path:
     """The file of a runner-up: a.p3p, a.2.p3p, a.3.p3p, ..."""
     return target.with_name(f"{target.stem}.{rank}{target.suffix}")
+
+
+def _further(target: Path, number: int) -> Path:
+    """The file of a photo's further pattern: a.p3p, a-2.p3p, a-3.p3p, ..."""
+    return target.with_name(f"{target.stem}-{number}{target.suffix}")
+
+
+def _is_further(name: str, names: Sequence[str]) -> bool:
+    """Whether `name` is also what a further pattern of another of the `names` would be called."""
+    stem, dash, number = name.rpartition("-")
+    return bool(dash) and number.isdigit() and int(number) > 1 and stem in names

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from p3i.grammar.ast import Program
-from p3i.search.result import Reading, StructureFound
+from p3i.search.result import Other, Reading, StructureFound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -15,6 +15,7 @@ class Answer:
     where it is the one assumed; then `focal_reason` may say why no other was found. `lens_k1` is the radial
     distortion of the photo that the program holds on (p3i/interp/lens.py), None for a pinhole camera.
     `readings` are the places of a lattice's cell that may be its object, the likeliest first.
+    `others` are the patterns beside this one that were met on the way to it.
     """
 
     program: Program
@@ -26,3 +27,4 @@ class Answer:
     focal_reason: str = ""
     lens_k1: float | None = None
     readings: tuple[Reading, ...] = ()
+    others: tuple[Other, ...] = ()

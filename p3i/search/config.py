@@ -142,6 +142,16 @@ class SearchConfig:
         """The extent that was asked for, else that of the recipe."""
         return self.extent or ("image" if self.recipe == "paper" else "found")
 
+    def check_for_all(self) -> None:
+        """Raise UsageError for an option that speaks of one pattern, where all of a photo are asked for."""
+        one = {"sketch": self.sketch, "start": self.start, "exhaustive": self.exhaustive_s}
+        named = [name for name, value in one.items() if value is not None]
+        named += ["recipe paper"] if self.recipe == "paper" else []
+        named += ["extent image"] if self.extent == "image" else []
+        named += ["top"] if self.top > 1 else []
+        if named:
+            raise UsageError(f"--{named[0]} speaks of one pattern, --all of every one: leave one out")
+
     def _check_asked(self) -> None:
         """What says how to search: a sketch, a start, a recipe, or nothing.
 

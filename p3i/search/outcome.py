@@ -42,7 +42,8 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         reason = StopReason.OUT_OF_SIGHT if sure else StopReason.COSTS_MORE if costly else why_not(config)
         if look.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
-        refused = told(config, assumed, None, look.stopped or reason, score=best, needed=needed)
+        least, stop = look.evidence.least_period_px, look.stopped or reason
+        refused = told(config, assumed, None, stop, score=best, needed=needed, least_period_px=least)
         look.record("answer", program=None, score=best, reason=refused.reason)
         return refused
     good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
@@ -99,6 +100,8 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         lens_k1=first.lens_k1,
         pose_sigma_deg=None if sigma_deg is None else round(sigma_deg, 3),
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
+        others=first.others,
+        window=look.evidence.part.window,
         notes=notes,
         **_focal_facts(first, assumed),
     )

@@ -121,6 +121,30 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Other:
+    """Another pattern on the photo, beside the answer's: what would be an answer by itself.
+
+    `center` is the middle of its `objects`, (x, y) in pixels, `region` as in SynthesisResult.
+    """
+
+    structure: StructureFound
+    center: tuple[float, float]
+    region: tuple[tuple[float, float], ...]
+    objects: int
+    score: float
+
+    def record(self) -> dict[str, Any]:
+        """The pattern as JSON has it."""
+        return {
+            "structure": self.structure,
+            "center": [round(value, 1) for value in self.center],
+            "region": [[round(x, 1), round(y, 1)] for x, y in self.region],
+            "objects": self.objects,
+            "score": _rounded(self.score),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisResult:
     """The answer for one photo.
 
@@ -143,6 +167,12 @@ class SynthesisResult:
     two can be told apart.
     `readings` are the places of a lattice's cell that may be its object, the likeliest first; empty for
     others. With StopReason.NO_SUCH_OBJECT they are what the cell offers in place of the one asked for.
+    `others` are further patterns that the search met beside the answer's, the most worth first: not all that
+    there are, which `p3i.synth_all` looks for.
+    `window` is the rectangle (x, y, width, height) of photo pixels that was looked at closer: the box of a
+    region of interest, or the part that the search chose; None for all of it.
+    `least_period_px` of a photo that was refused: what repeats more closely than so many pixels was too small
+    to be seen, since the photo is looked at reduced; None where nothing was.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
     """
 
@@ -166,20 +196,26 @@ class SynthesisResult:
     pose_sigma_deg: float | None = None
     readings: tuple[Reading, ...] = ()
     mirrored: tuple[float, float] | None = None
+    others: tuple[Other, ...] = ()
+    window: tuple[int, int, int, int] | None = None
+    least_period_px: int | None = None
     notes: tuple[str, ...] = ()
 
     @property
     def reason(self) -> str:
         """Why the search ended, as a sentence with its numbers; empty where there is nothing to explain."""
+        why = self.stop.value
         if (
             self.stop in (StopReason.NO_PATTERN, StopReason.NO_FIT)
             and self.score is not None
             and self.needed is not None
         ):
-            return f"{self.stop.value} (best {self.score:.2f}, needs {self.needed:.2f})"
+            why = f"{why} (best {self.score:.2f}, needs {self.needed:.2f})"
         if self.stop is StopReason.NO_SUCH_OBJECT:
-            return f"{self.stop.value} (it offers {', '.join(reading.name for reading in self.readings)})"
-        return self.stop.value
+            return f"{why} (it offers {', '.join(reading.name for reading in self.readings)})"
+        if self.least_period_px is None or self.program is not None:
+            return why
+        return f"{why}; repeats of less than {self.least_period_px} pixels are not seen: --roi looks closer"
 
     @property
     def reading(self) -> Reading | None:
@@ -229,6 +265,10 @@ class SynthesisResult:
             "features": self.features,
             "seed": self.seed,
         }
+        if self.window is not None:
+            record["window"] = list(self.window)
+        if self.others:
+            record["others"] = [other.record() for other in self.others]
         if len(self.candidates) > 1:
             record["candidates"] = [candidate.record() for candidate in self.candidates]
         return record

@@ -11,6 +11,7 @@ from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
+from p3i.search.closer import looked_closer
 from p3i.search.config import SearchConfig
 from p3i.search.extent.drawn import drawn
 from p3i.search.extent.layout import proposed, supported
@@ -26,7 +27,7 @@ from p3i.search.forms.sketches import Sketched, sketches
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.judge.answered import answers_of
 from p3i.search.judge.bits import by_explained
-from p3i.search.judge.elsewhere import with_note_of_others
+from p3i.search.judge.elsewhere import with_others
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.optics.curve_focal import with_paid_focal
@@ -77,7 +78,12 @@ def synthesize(
             answers = _answers(look)
             if config.lens == "auto" and not asks_for_itself(config):
                 answers = with_lens(look, answers, _finished_anew)
-        return look.completed(lambda: outcome(look, answers, assumed=assumed))
+        result = look.completed(lambda: outcome(look, answers, assumed=assumed))
+        closer = looked_closer(look, _answers) if result.program is None else None
+        if closer is None:
+            return result
+        seen = look.completed(lambda: outcome(*closer, assumed=assumed))
+        return result if seen.program is None else seen
 
 
 def searched(look: Session) -> Best:
@@ -188,7 +194,7 @@ def _by_bits(look: Session, best: Best) -> list[Answer]:
     answers = by_explained(look.evidence, groups)
     if asks_for_itself(look.config):
         return answers
-    return with_note_of_others(look, best.fits, answers, finish=_finished)
+    return with_others(look, best.fits, answers, finish=_finished)
 
 
 def _finished(look: Session, fit: Fit) -> Answer | None:
@@ -223,7 +229,7 @@ def _hopeless(image: Image) -> StopReason | None:
     """Why a picture is not worth a search, if so."""
     if min(image.size.width, image.size.height) < _LEAST_SIDE:
         return StopReason.TOO_SMALL
-    if float(image.valid.mean()) < _LEAST_KNOWN:
+    if float(image.valid[... if image.roi is None else image.roi].mean()) < _LEAST_KNOWN:
         return StopReason.TOO_LITTLE_KNOWN
     step = max(1, image.size.longer // FINE)
     grey = image.pixels[::step, ::step].mean(2)[image.valid[::step, ::step]]

@@ -28,7 +28,8 @@ class Image:
     is kept in `source`, not applied, except for CMYK and Lab files). `valid` bool [H, W]: False is unknown
     (transparent, NaN), never evidence. `focal_mm`: from EXIF, 35 mm-equivalent on p3i's terms
     (f_px = focal_mm / 36 * longer side), or None. `stride`: pixels of the photo per pixel of this image,
-    not 1 after `resized`. `notes`: what a user should know of the reading, a sentence each.
+    not 1 after `resized`. `notes`: what a user should know of the reading, a sentence each. `roi` bool [H, W]
+    is where a person asked to look: elsewhere nothing is known, and nothing is drawn. None is everywhere.
     """
 
     pixels: np.ndarray
@@ -37,6 +38,7 @@ class Image:
     source: Source = field(default=Source("PNG"))
     notes: tuple[str, ...] = ()
     stride: float = 1.0
+    roi: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.dtype != np.float32:
@@ -45,6 +47,8 @@ class Image:
             raise ValueError(
                 f"valid is bool {self.pixels.shape[:2]}, not {self.valid.dtype} {self.valid.shape}"
             )
+        if self.roi is not None and self.roi.shape != self.valid.shape:
+            raise ValueError(f"roi is bool {self.valid.shape}, not {self.roi.shape}")
 
     @property
     def size(self) -> Size:
@@ -101,12 +105,19 @@ def masked(image: Image, unknown: np.ndarray) -> Image:
     return replace(image, valid=image.valid & ~unknown)
 
 
+def within(image: Image, roi: np.ndarray) -> Image:
+    """The same image, looked at only where `roi` (bool [H, W]) is True, and where it was before."""
+    roi = roi if image.roi is None else roi & image.roi
+    return replace(image, valid=image.valid & roi, roi=roi)
+
+
 def resized(image: Image, longer: int) -> Image:
     """The image with its longer side reduced to `longer` pixels; itself, if it is no larger than that.
 
     Each new pixel is the mean of the valid area that it covers, and valid where that is at least half.
     Both axes shrink by exactly s = old longer / new longer (the shorter side is rounded, its last pixel
-    cut or dropped rather than stretched), so the new point u is the old point (u + 0.5) * s - 0.5.
+    cut or dropped rather than stretched), so the new point u is the old point (u + 0.5) * s - 0.5. A smaller
+    image has no `roi`: what lies outside is unknown already.
     Raises ValueError for a side below 1.
     """
     if longer < 1:
@@ -117,13 +128,14 @@ def resized(image: Image, longer: int) -> Image:
     if image.valid.all():
         pixels = _area_mean(image.pixels, scale)
         return replace(
-            image, pixels=pixels, valid=np.ones(pixels.shape[:2], bool), stride=image.stride * scale
+            image, pixels=pixels, valid=np.ones(pixels.shape[:2], bool), stride=image.stride * scale, roi=None
         )
     known = image.valid.astype(np.float32)
     weight = _area_mean(known, scale)
     pixels = _area_mean(image.pixels * known[:, :, None], scale) / np.maximum(weight, 1e-6)[:, :, None]
     pixels = np.clip(pixels, 0, 1)
-    return replace(image, pixels=pixels, valid=weight >= 0.5 - 1e-6, stride=image.stride * scale)
+    valid = weight >= 0.5 - 1e-6
+    return replace(image, pixels=pixels, valid=valid, stride=image.stride * scale, roi=None)
 
 
 def resized_from_photo(scale: float) -> np.ndarray:

@@ -95,7 +95,7 @@ def cell_sides_px(image_from_cells: NDArray, points: NDArray) -> tuple[Array, Ar
 
 
 def visible_box(
-    image_from_cells: Array, shape: tuple[int, int], *, min_px: float = 4.0, max_cells: int = 6000
+    image_from_cells: Array, shape: tuple[int, int], *, min_px: float = 4.0, max_cells: int = 12000
 ) -> Box | None:
     """The box of all cells that show in a photo of `shape` [H, W] at `min_px` or more a side.
 

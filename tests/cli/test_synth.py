@@ -493,3 +493,71 @@ def test_a_name_that_is_no_text_is_printed_all_the_same(photo, capsys) -> None:
     assert json.loads(capsys.readouterr().out)["image"] == name
     assert run(["synth", name]) == 0
     assert run(["synth", "-v", name, "-o", "out/"]) == 0
+
+
+FINDS_TWO = 210
+
+
+@pytest.fixture
+def two(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that finds two patterns on photos of one grey level: the second where the first is masked."""
+    plain = search.synthesize
+
+    def synthesize(image, config, *, progress=None, trace=None) -> SynthesisResult:
+        again = bool((~image.valid).any())
+        level = round(float(image.pixels[0, 0, 0]) * 255)
+        if again and (level != FINDS_TWO or not image.valid[0, 63]):
+            return SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.12, needed=0.35)
+        result = plain(image, config, progress=progress, trace=trace)
+        if not again:
+            return result
+        corner = p3i.loads("SetCameraPose(rx=0, ry=0)\nfor i in range(0, 2):\n    Draw(x=3*i + 45, y=-34)\n")
+        centers = ((60.0, 3.0, 0, 0), (62.0, 3.0, 1, 0))
+        return dataclasses.replace(result, program=corner, centers=centers, score=0.5)
+
+    monkeypatch.setattr(sys.modules["p3i.search.synthesize"], "synthesize", synthesize)
+
+
+def test_all_prints_a_program_for_each_pattern(photo, two, capsys) -> None:
+    assert run(["synth", photo("a.png", FINDS_TWO), "--all"]) == 0
+    out = capsys.readouterr().out
+    first, second = out.split("\n# pattern 2 of 2: lattice, score 0.5000\n")
+    assert first.startswith("# pattern 1 of 2: lattice, score 0.8765\n")
+    assert p3i.loads(second).header is not None
+    assert "x=3*i" in second and "x=3*i" not in first
+
+
+def test_all_of_a_photo_with_one_pattern_is_as_without(photo, two, capsys) -> None:
+    assert run(["synth", photo("a.png"), "--all"]) == 0
+    assert capsys.readouterr().out == Path(__file__).with_name("golden").joinpath("synth.p3p").read_text()
+
+
+def test_all_is_a_line_of_jsonl_for_each_pattern(photo, two, capsys) -> None:
+    names = [photo("a.png", FINDS_TWO), photo("b.png", FINDS_NOTHING), photo("c.png")]
+    assert run(["synth", *names, "--all", "--format", "jsonl", "-q"]) == 6
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    told = [(one["image"], one.get("pattern"), one.get("patterns")) for one in lines]
+    assert told == [("a.png", 1, 2), ("a.png", 2, 2), ("b.png", None, None), ("c.png", 1, 1)]
+
+
+def test_all_writes_a_file_for_each_pattern_and_overwrites_none(photo, two, capsys) -> None:
+    Path("out").mkdir()
+    Path("out/a-2.p3p").write_text("mine")
+    words = ["synth", photo("a.png", FINDS_TWO), "--all", "-o", "out/"]
+    assert run(words) == 3
+    assert "a-2.p3p" in capsys.readouterr().err
+    assert not Path("out/a.p3p").exists() and Path("out/a-2.p3p").read_text() == "mine"
+    assert run([*words, "--force"]) == 0
+    assert "x=3*i" in Path("out/a-2.p3p").read_text() and Path("out/a.p3p").exists()
+
+
+def test_photos_named_like_a_further_pattern_of_another_are_refused(photo, two, capsys) -> None:
+    names = [photo("a.png"), photo("a-2.png")]
+    assert run(["synth", *names, "--all", "-o", "out/"]) == 2
+    assert "a-2.p3p" in capsys.readouterr().err
+    assert run(["synth", *names, "-o", "out/"]) == 0
+
+
+def test_all_and_several_candidates_contradict_each_other(photo, two, capsys) -> None:
+    assert run(["synth", photo("a.png"), "--all", "--top", "3"]) == 2
+    assert "--top" in capsys.readouterr().err

@@ -130,7 +130,7 @@ class Said(Once):
 
 
 IN_A_CALL = [
-    ("lattice", "synthesize.with_note_of_others", 1),
+    ("lattice", "synthesize.with_others", 1),
     ("ring", "synthesize.fit_places", 2),
     ("ring", "extent.ring.as_far_as_it_goes", 1),
     ("ring", "extent.ring.places", 2),

@@ -64,14 +64,14 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[
     They lie at the likeliest place of the cell, or at the one that the options ask for where the cell has it.
     With a note on other rows that are as natural, else "". None where no object is seen.
     """
-    image = evidence.image
+    image = evidence.part.image
     matrix, support = _seen(evidence, lattice, ground)
     phases = find_phases(image.pixels, image.valid, matrix, lattice.basis, support)
 
     @cache
     def cells(origin: tuple[float, float]) -> Cells | None:
         at = np.array(origin)
-        return cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, at, support)
+        return cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, at, support, roi=image.roi)
 
     def held(phase: Phase) -> Cells | None:
         return cells((float(phase.origin[0]), float(phase.origin[1])))
@@ -84,7 +84,7 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[
     drawn = phases[next((k for k, name in enumerate(names) if asked in (name, str(k + 1))), 0)]
     edges = edge_directions(image.pixels, matrix, support & image.valid)
     there, own = held(drawn), replace(lattice, origin=drawn.origin)
-    found = None if there is None else in_rows(there, own, edges=edges, unit_px=image.size.unit_px)
+    found = None if there is None else in_rows(there, own, edges=edges, unit_px=evidence.image.size.unit_px)
     if found is None or _is_a_row(found[0]):
         return None
     layout, note = found
@@ -128,9 +128,11 @@ def layout_at(
     evidence: Evidence, lattice: Lattice, ground: Tensor, *, readings: tuple[Reading, ...]
 ) -> Layout | None:
     """The objects of a lattice that lie at its points, one of the `readings`; else as found_layout."""
-    image = evidence.image
+    image = evidence.part.image
     matrix, support = _seen(evidence, lattice, ground)
-    cells = cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support)
+    cells = cells_that_hold(
+        image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support, roi=image.roi
+    )
     found = None if cells is None else cells.outline()
     if found is None:
         return None
@@ -141,7 +143,8 @@ def layout_at(
 def _seen(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[np.ndarray, np.ndarray]:
     """The homography of a lattice's camera [3, 3], and where the cells `ground` [N, 2] lie: bool [H, W]."""
     size = evidence.image.size
-    matrix = image_from_plane(lattice.rx_deg, lattice.ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
+    seen = image_from_plane(lattice.rx_deg, lattice.ry_deg, size=size, focal_mm=evidence.focal_mm)
+    matrix = (evidence.part.from_photo @ seen).numpy()
     return matrix, _painted(evidence, ground, matrix, lattice)
 
 
@@ -213,8 +216,8 @@ def refitted(evidence: Evidence, layout: Layout) -> Layout:
 
 
 def _painted(evidence: Evidence, cells: Tensor, matrix: np.ndarray, lattice: Lattice) -> np.ndarray:
-    """Where the cells [N, 2] lie in the photo: bool [H, W]."""
-    size = evidence.image.size
+    """Where the cells [N, 2] lie in what is looked at: bool [H, W]."""
+    size = evidence.part.size
     canvas = np.zeros((size.height, size.width), np.uint8)
     points, _ = cell_corners(matrix @ lattice.plane_from_index, cells)
     for polygon in np.round(points).astype(np.int32):

@@ -5,14 +5,12 @@ What each cell says for an object is told by p3i.vision.cell_bits; which of them
 bit, as a claim that nobody can check.
 """
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from p3i.search.extent.alike import look_alike, working_size
-from p3i.search.extent.outline import Cells, best_outline
+from p3i.search.extent.outline import GUARD_BITS, Cells, best_outline
 from p3i.vision.cell_bits import cell_bits
 from p3i.vision.sheet import Box, cell_sides_px, cells_from_basis, project
 
@@ -31,12 +29,15 @@ def cells_that_hold(
     basis: Array,
     origin: Array,
     support: NDArray | None = None,
+    *,
+    roi: Mask | None = None,
 ) -> Cells | None:
     """How surely each cell of a lattice holds an object in a photo; None where none is seen to.
 
     Convention: pixels [H, W, 3] RGB in 0..1, valid [H, W]; `image_from_plane` 3x3 maps plane points in front
     of the camera to positive third coordinates; basis [2, 2] has rows u, v and origin [2] is the middle of an
-    object, all in plane coordinates; support [H, W], boolean or in 0..1, may be rough.
+    object, all in plane coordinates; support [H, W], boolean or in 0..1, may be rough. A cell whose middle
+    lies outside `roi` [H, W] holds nothing, whatever is there.
     """
     small, mask, matrix = working_size(pixels, valid, image_from_plane)
     if support is not None and support.shape != mask.shape:
@@ -51,9 +52,12 @@ def cells_that_hold(
         return None
     grid = (box.rows, box.columns)
     bits = np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid)
-    cells = Cells(bits, found.judged.reshape(grid), (box.i_start, box.j_start))
     halves = found.halves.reshape(4, *grid)
-    return replace(cells, bits=_with_rims(bits, halves))
+    if roi is not None:
+        outside = _outside(cells_from_basis(matrix, basis, origin), box, roi, roi.shape[1] / mask.shape[1])
+        nothing = min(float(bits.min()), -GUARD_BITS)
+        bits, halves = (np.where(outside.reshape(grid), nothing, one) for one in (bits, halves))
+    return Cells(_with_rims(bits, halves), found.judged.reshape(grid), (box.i_start, box.j_start))
 
 
 def _with_rims(bits: Array, halves: Array) -> Array:
@@ -65,6 +69,15 @@ def _with_rims(bits: Array, halves: Array) -> Array:
         return bits
     inside, wider = (outline.holds(i, j) for outline in outlines if outline is not None)
     return np.where(wider & ~inside, np.maximum(bits, halves.max(0)), bits)
+
+
+def _outside(image_from_cells: Array, box: Box, roi: Mask, scale: float) -> Mask:
+    """Which cells [N] have their middle outside a region [H, W], `scale` of whose pixels are one here."""
+    at, front = project(image_from_cells, box.indices.astype(float))
+    x, y = np.round((np.nan_to_num(at).clip(-1e6, 1e6) + 0.5) * scale - 0.5).astype(int).T
+    height, width = roi.shape
+    inside = front & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return ~(inside & roi[y.clip(0, height - 1), x.clip(0, width - 1)])
 
 
 def _middle_shows(image_from_cells: Array, box: Box, shape: tuple[int, int]) -> tuple[Mask, Mask]:

@@ -20,6 +20,15 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import MOST_FALSE_ALARMS
 
 
+def chosen_among(ways: int, answer: Answer) -> Answer:
+    """An answer, whose `worth` is in bits, that was found where one of so many `ways` to look was chosen.
+
+    As many times more programs were within reach, so its bits are fewer by the logarithm of that, for every
+    rule.
+    """
+    return replace(answer, worth=answer.worth - math.log2(ways))
+
+
 def false_alarms(bits: float) -> float:
     """How many finds of these bits are expected in a picture without a pattern, at most 1; 0 where it is less
     than any number.

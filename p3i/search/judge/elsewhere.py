@@ -1,7 +1,7 @@
-"""Other patterns on the same photo: the answer is the dominant one, and says where another lies.
+"""Other patterns on the same photo: the answer is the dominant one, and says where others lie.
 
-A photo of a house's corner shows two facades, of a room floor and wall. One program has one plane, so the
-others are told as a note. They come for free: fits that grew elsewhere while the answer's was looked for.
+A photo of a house's corner shows two facades, a hall a dozen boards. One program has one plane, so the others
+are told beside it. They come nearly for free: fits that grew elsewhere while the answer's was looked for.
 """
 
 import dataclasses
@@ -19,11 +19,11 @@ from p3i.search.judge.region import centers_px, region_px
 from p3i.search.look.cells import sample_points
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
-from p3i.search.result import NEEDED
+from p3i.search.result import NEEDED, Other
 
 # A fit lies elsewhere where at most this share of its cells falls into the answer's region.
 _MOST_INSIDE = 0.3
-# Fits that explain this much of the photo (as in lattices.py) are worth working out for a note ...
+# Fits that explain this much of the photo are worth working out for a note ...
 _LEAST_SCORE = 0.02
 # ... and planes whose normals differ by more than this are two.
 _OTHER_PLANE_DEG = 8.0
@@ -31,42 +31,71 @@ _OTHER_PLANE_DEG = 8.0
 Finish = Callable[[Session, Fit], Answer | None]
 
 
-def with_note_of_others(
-    session: Session, fits: list[Fit], answers: list[Answer], *, finish: Finish
-) -> list[Answer]:
-    """The answers, the best first, of which the first says whether another pattern lies beside its own.
+def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, finish: Finish) -> list[Answer]:
+    """The answers, the best first, of which the first knows, and says, which patterns lie beside its own.
 
     `fits` are all that were grown, the best first; `finish` works one out to a program. A pattern is told of
-    only where its own program reaches what an answer needs.
+    only where its own program reaches what an answer needs, and once.
     """
     if not answers or answers[0].score < NEEDED:
         return answers
-    first, evidence = answers[0], session.evidence
-    region = _polygon(evidence, first)
+    evidence, first = session.evidence, answers[0]
+    regions, others = [_polygon(evidence, first)], []
+
+    def elsewhere(points: np.ndarray) -> bool:
+        return all(_inside(region, points) <= _MOST_INSIDE for region in regions)
+
+    def keep(other: Answer) -> None:
+        if other.score >= NEEDED and elsewhere(_centers(evidence, other)):
+            regions.append(_polygon(evidence, other))
+            others.append(other)
+
     for other in answers[1:]:
-        if other.score >= NEEDED and _inside(region, _centers(evidence, other)) <= _MOST_INSIDE:
-            return [_noted(evidence, first, other), *answers[1:]]
+        keep(other)
     for fit in fits:
         if fit.covered < _LEAST_SCORE or not session.go_on():
             break
-        if _inside(region, _cells_px(evidence, fit)) > _MOST_INSIDE:
+        if not elsewhere(_cells_px(evidence, fit)):
             continue
         other = finish(session, fit)
-        if other is not None and other.score >= NEEDED:
-            return [_noted(evidence, first, other), *answers[1:]]
-    return answers
+        if other is not None:
+            keep(other)
+    if not others:
+        return answers
+    told = tuple(_told(evidence, other) for other in others)
+    notes = (*first.notes, _note(told, turned=_turned(first, others[0])))
+    return [dataclasses.replace(first, notes=notes, others=told), *answers[1:]]
 
 
-def _noted(evidence: Evidence, first: Answer, other: Answer) -> Answer:
-    cosine = sum(
-        a * b for a, b in zip(*(Camera.of(one.program).normal for one in (first, other)), strict=True)
+def _turned(one: Answer, other: Answer) -> bool:
+    """Whether the planes of two answers are turned against each other."""
+    cosine = sum(a * b for a, b in zip(*(Camera.of(it.program).normal for it in (one, other)), strict=True))
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine)))) > _OTHER_PLANE_DEG
+
+
+def _told(evidence: Evidence, answer: Answer) -> Other:
+    """An answer as what lies beside another, on the photo as it is."""
+    centers, region = (
+        evidence.on_photo(torch.from_numpy(points.astype(float))).numpy()
+        for points in (_centers(evidence, answer), _polygon(evidence, answer))
     )
-    turned = math.degrees(math.acos(max(-1.0, min(1.0, cosine)))) > _OTHER_PLANE_DEG
-    places = evidence.on_photo(torch.from_numpy(_centers(evidence, other)))
-    x, y = np.median(places.numpy(), axis=0)
-    where = f"around ({x:.0f}, {y:.0f})"
-    note = f"another plane carries a pattern, {where}" if turned else f"another pattern lies {where}"
-    return dataclasses.replace(first, notes=(*first.notes, note))
+    x, y = np.median(centers, axis=0).tolist()
+    return Other(
+        structure=answer.structure,
+        center=(x, y),
+        region=tuple((float(px), float(py)) for px, py in region),
+        objects=len(centers),
+        score=answer.score,
+    )
+
+
+def _note(others: tuple[Other, ...], *, turned: bool) -> str:
+    """The sentence that tells of others; `turned`: the first of them lies on another plane."""
+    where = ", ".join(f"({x:.0f}, {y:.0f})" for x, y in (other.center for other in others))
+    if len(others) > 1:
+        return f"{len(others)} other patterns lie around {where}: synth --all gives each its program"
+    what = "another plane carries a pattern," if turned else "another pattern lies"
+    return f"{what} around {where}: synth --all gives it a program too"
 
 
 def _polygon(evidence: Evidence, answer: Answer) -> np.ndarray:

@@ -5,8 +5,10 @@ The score is a function of photo and finished program (with the focal and the le
 decides what it goes on with, and may refuse an answer that this score would let pass.
 """
 
+import re
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 
 from p3i.errors import ProgramError
@@ -21,9 +23,9 @@ from p3i.search.forms.whole import scaled
 from p3i.search.look.contrast import mean_contrast, placed_right, score_of, score_of_curve
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.straight import straightened
-from p3i.vision.image import Image
+from p3i.vision.image import Image, within
 from p3i.vision.threads import limited_threads
-from p3i.vision.warp import in_frame, sample, sample_valid
+from p3i.vision.warp import sample, sample_valid
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +48,9 @@ class Evaluation:
 def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation:
     """Score a program on a photo, whatever it draws.
 
-    The focal is that of the options, else the program's header, else the photo, else 35 mm; the lens is that
-    of the header. Raises ProgramError where fewer than two of the program's objects lie in the photo, and
-    for programs that no picture can show (p3i/interp/degenerate.py).
+    The focal is that of the options, else the program's header, else the photo, else 35 mm; the lens and the
+    window of the photo that is looked at are those of the header. Raises ProgramError where fewer than two of
+    the program's objects lie there, and for programs that no picture can show (p3i/interp/degenerate.py).
     """
     with limited_threads(config.threads):
         return _evaluated(image, program, config)
@@ -60,16 +62,29 @@ def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluati
     given = None if config.focal_mm == "auto" else config.focal_mm
     focal_mm = next(mm for mm in (given, header, image.focal_mm, 35.0) if mm is not None)
     k1 = program.header.lens_k1 if program.header is not None else None
+    image = _in_window(image, program)
     evidence, program = without_lens(Evidence(image, config, focal_mm), program, k1)
     refuse_edge_on(Camera.of(program, focal_mm=evidence.focal_mm))
     pattern = without_doubles(compile(program))
     refuse_far_steps(pattern, pattern.index.numpy())
     points, in_front = pattern.centers_px(size=evidence.image.size, focal_mm=evidence.focal_mm)
-    seen = in_front & in_frame(points, evidence.image.size)
+    seen = in_front & evidence.part.shows(points)
     if int(seen.sum()) < 2:
         raise ProgramError(f"{int(seen.sum())} of the program's objects lie in the photo; a score needs two")
     loss, pairs = _equation2(evidence, pattern, points, seen)
     return Evaluation(loss, pairs, normalised_score(evidence, pattern), int(seen.sum()))
+
+
+def _in_window(image: Image, program: Program) -> Image:
+    """The photo as the search looked at it that found the program: in the window that its header tells of."""
+    facts = dict(program.header.fit) if program.header is not None else {}
+    told = re.fullmatch(r"(\d{1,9}),(\d{1,9}),(\d{1,9}),(\d{1,9})", str(facts.get("window", "")))
+    if told is None:
+        return image
+    left, top, width, height = map(int, told.groups())
+    inside = np.zeros(image.valid.shape, bool)
+    inside[top : top + height, left : left + width] = True
+    return within(image, inside) if inside.any() else image
 
 
 def score_of_program(
@@ -125,7 +140,7 @@ def _equation2(
 ) -> tuple[float, int]:
     """The loss as printed, on the features of the fine map, and the number of its pairs."""
     features = evidence.features(FINE)
-    at, _ = project(features.map_from_photo, points)
+    at, _ = project(features.map_from_photo @ evidence.part.from_photo, points)
     known = seen & sample_valid(features.valid, at.float())
     pairs = pattern.edges[known[pattern.edges].all(1)]
     values = sample(features.values, at.float())

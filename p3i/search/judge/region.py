@@ -9,6 +9,7 @@ from p3i.interp import unroll
 from p3i.interp.camera import Camera, project
 from p3i.interp.compile import compile
 from p3i.interp.lens import photo_from_straight
+from p3i.search.look.part import shown
 from p3i.search.look.patches import frames, spacing
 from p3i.size import Size
 from p3i.vision.image import Image
@@ -33,9 +34,13 @@ def centers_px(
 
 
 def share_in_sight(program: Program, image: Image, focal_mm: float, *, lens_k1: float | None = None) -> float:
-    """The share of the program's objects that the photo shows, 0 to 1; draws that coincide are one object."""
+    """The share of the program's objects that the photo shows, 0 to 1, in its region of interest.
+
+    Draws that coincide are one object.
+    """
     drawn = len(unroll.distinct(unroll.points(program)))
-    return len(centers_px(program, image, focal_mm, lens_k1=lens_k1)) / max(drawn, 1)
+    centers = torch.tensor(centers_px(program, image, focal_mm, lens_k1=lens_k1)).reshape(-1, 4)
+    return int(shown(image, centers[:, :2]).sum()) / max(drawn, 1)
 
 
 def region_px(

@@ -11,12 +11,12 @@ from torch import Tensor
 
 from p3i.interp.pattern import Pattern
 from p3i.search.config import SearchConfig
+from p3i.search.look.part import Box, Part, part_of
 from p3i.size import Size
 from p3i.vision.features import FeatureMap, extract
 from p3i.vision.fill import filled
 from p3i.vision.image import Image, resized
 from p3i.vision.lab import lab_of
-from p3i.vision.warp import in_frame
 
 COARSE = 320
 """Longer side, in pixels, of the map on which patterns with large cells are found."""
@@ -28,6 +28,8 @@ FINE = 640
 _BLUR_SHARE = 0.1
 # Colours are not reduced below this many pixels on the longer side.
 _SMALLEST_MAP = 96
+# What repeats at fewer pixels of the fine map than so many is not seen (docs/search.md).
+_LEAST_PERIOD = 8.0
 # Cells narrower than this on the coarse map are looked at on the fine one.
 _LEAST_COARSE_CELL = 24.0
 
@@ -93,6 +95,8 @@ def _itself(points_px: Tensor) -> Tensor:
 class Evidence:
     """A photo as the search sees it. Holds the maps that were made so far, nothing else changes.
 
+    `image` is the whole photo, whose canvas is the camera's; `part` what of it is looked at, and what the
+    maps are made of (look/part.py): the `window`, else its region of interest, else all of it.
     `on_photo` takes points [N, 2] in pixels of `image` to pixels of the photo as it is, where that is another
     canvas (look/straight.py).
     """
@@ -101,33 +105,46 @@ class Evidence:
     config: SearchConfig
     focal_mm: float
     on_photo: Callable[[Tensor], Tensor] = _itself
+    window: Box | None = None
+    part: Part = field(init=False)
     _maps: dict[tuple[str, int], FeatureMap] = field(default_factory=dict)
     _levels: dict[tuple[str, int, float], Level] = field(default_factory=dict)
     _colours: dict[int, ColourMap] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.part = part_of(self.image, self.window)
 
     def under(self, focal_mm: float) -> "Evidence":
         """The same photo under another focal (mm); what does not depend on it is shared, not made again."""
         if focal_mm == self.focal_mm:
             return self
         return Evidence(
-            self.image, self.config, focal_mm, self.on_photo, _maps=self._maps, _colours=self._colours
+            self.image,
+            self.config,
+            focal_mm,
+            self.on_photo,
+            self.window,
+            _maps=self._maps,
+            _colours=self._colours,
         )
 
     def features(self, longer: int, *, name: str | None = None) -> FeatureMap:
-        """The photo's features with the longer side reduced to `longer` pixels (never enlarged).
+        """The features of the part, its longer side reduced to `longer` pixels (never enlarged).
 
         `name` asks for other features than those of the search.
         """
-        key = name or self.config.features_used, min(longer, self.image.size.longer)
+        key = name or self.config.features_used, min(longer, self.part.size.longer)
         if key not in self._maps:
-            self._maps[key] = extract(self.image, name=key[0], longer=key[1], weights=self.config.weights)
+            self._maps[key] = extract(
+                self.part.image, name=key[0], longer=key[1], weights=self.config.weights
+            )
         return self._maps[key]
 
     def level(self, longer: int, *, blur: float, name: str | None = None) -> Level:
         """The map of that size, blurred by a Gaussian of `blur` map pixels, with its derivatives."""
         # Steps of a factor 2^(1/2) in blur: finer ones would only cost memory.
         step = round(2 * math.log2(max(blur, 0.5))) / 2
-        key = name or self.config.features_used, min(longer, self.image.size.longer), step
+        key = name or self.config.features_used, min(longer, self.part.size.longer), step
         if key not in self._levels:
             self._levels[key] = _level(self, self.features(longer, name=name), 2.0**step)
         return self._levels[key]
@@ -135,13 +152,14 @@ class Evidence:
     def colours_for(self, step_px: float) -> ColourMap:
         """The photo's colours on a map where samples `step_px` photo pixels apart are about a pixel apart."""
         halvings = min(5, max(0, round(math.log2(max(step_px, 1.0)) + 0.2)))
-        while halvings and self.image.size.longer / 2**halvings < _SMALLEST_MAP:
+        while halvings and self.part.size.longer / 2**halvings < _SMALLEST_MAP:
             halvings -= 1
         if halvings not in self._colours:
-            small = resized(self.image, math.ceil(self.image.size.longer / 2**halvings))
+            small = resized(self.part.image, math.ceil(self.part.size.longer / 2**halvings))
             lab = cv2.GaussianBlur(lab_of(filled(small.pixels, small.valid)), (0, 0), 0.7)
             shift, scale = 0.5 / small.stride - 0.5, 1 / small.stride
             matrix = torch.tensor([[scale, 0, shift], [0, scale, shift], [0, 0, 1.0]], dtype=torch.float64)
+            matrix = matrix @ self.part.from_photo
             values = torch.from_numpy(lab).permute(2, 0, 1).contiguous()
             self._colours[halvings] = ColourMap(lab, values, torch.from_numpy(small.valid), matrix)
         return self._colours[halvings]
@@ -149,10 +167,16 @@ class Evidence:
     def in_sight(
         self, pattern: Pattern, theta: Tensor | None = None, *, focal_mm: float | None = None
     ) -> Tensor:
-        """Which of a program's draws the photo shows, [N] bool; by its own numbers and the focal assumed."""
+        """Which of a program's draws are looked at, [N] bool; by its own numbers and the focal assumed."""
         size = self.image.size
         points, in_front = pattern.centers_px(theta, size=size, focal_mm=focal_mm or self.focal_mm)
-        return in_front & in_frame(points, size)
+        return in_front & self.part.shows(points)
+
+    @property
+    def least_period_px(self) -> int | None:
+        """Steps of fewer photo pixels are too small for the finest map; None where that is not reduced."""
+        reduced = self.part.size.longer / FINE
+        return math.ceil(_LEAST_PERIOD * reduced) if reduced > 1 else None
 
     @property
     def frame(self) -> Level:
@@ -161,9 +185,9 @@ class Evidence:
 
     def level_for(self, cell_px: float, *, finest: bool = False, name: str | None = None) -> Level:
         """The map on which cells of `cell_px` photo pixels a side are compared best."""
-        scale = min(1.0, COARSE / self.image.size.longer)
+        scale = min(1.0, COARSE / self.part.size.longer)
         longer = FINE if finest or cell_px * scale < _LEAST_COARSE_CELL else COARSE
-        cell = cell_px * min(1.0, longer / self.image.size.longer)
+        cell = cell_px * min(1.0, longer / self.part.size.longer)
         return self.level(longer, blur=_BLUR_SHARE * cell, name=name)
 
 
@@ -180,7 +204,7 @@ def _level(evidence: Evidence, features: FeatureMap, blur: float) -> Level:
     return Level(
         torch.from_numpy(stack),
         features.valid,
-        features.map_from_photo,
+        features.map_from_photo @ evidence.part.from_photo,
         evidence.image.size,
         evidence.focal_mm,
     )

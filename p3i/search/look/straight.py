@@ -47,7 +47,9 @@ def straightened(image: Image, k1: float) -> Straightened:
     straight = pixel_grid(canvas, dtype=torch.float32) - margin
     points, shown = photo_from_straight(straight, k1, size=size)
     pixels, valid = remapped(image.pixels, image.valid, points.numpy())
-    straight_image = dataclasses.replace(image, pixels=pixels, valid=valid & shown.numpy())
+    # What is asked for is as wide as where that is known; each point reads its nearest pixel.
+    roi = None if image.roi is None else remapped(image.pixels[..., :1], image.roi, points.numpy())[1]
+    straight_image = dataclasses.replace(image, pixels=pixels, valid=valid & shown.numpy(), roi=roi)
     return Straightened(straight_image, size, k1, canvas.longer / size.longer)
 
 

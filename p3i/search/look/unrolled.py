@@ -21,7 +21,7 @@ _ANGLES = 288
 _STEP = 2 * math.pi / _ANGLES
 # Rows are this far apart in log radius; a bit coarser than the angles.
 _ROW_STEP = 0.035
-# Radii in program units.
+# Radii in hundredths of the longer side that is looked at: program units, where that is all of the photo.
 _RADII = (3.0, 75.0)
 _COUNTS = (4, 48)
 # The level of the photo that is unrolled: its longer side, about.
@@ -77,10 +77,10 @@ def unroll(
 
     `about` asks for the radii near this one only.
     """
-    size = evidence.image.size
-    colours = evidence.colours_for(size.longer / _LONGER)
+    size, share = evidence.image.size, evidence.part.share
+    colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
     matrix = colours.map_from_photo.numpy() @ image_from_plane(*pose, size=size, focal_mm=focal_mm).numpy()
-    low, high = _RADII if about is None else (about / _NEAR, about * _NEAR)
+    low, high = (about / _NEAR, about * _NEAR) if about is not None else (r * share for r in _RADII)
     radii = np.exp(np.arange(math.log(low), math.log(high), _ROW_STEP))
     angles = np.arange(_ANGLES, dtype=float) * _STEP
     at, known = polar_points(colours, matrix, center, radii, angles)

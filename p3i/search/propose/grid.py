@@ -54,7 +54,7 @@ class PointMaps:
     @classmethod
     def of(cls, evidence: Evidence) -> "PointMaps":
         """The maps of a photo, at about `COARSE` pixels a side."""
-        colours = evidence.colours_for(max(1.0, evidence.image.size.longer / COARSE))
+        colours = evidence.colours_for(max(1.0, evidence.part.size.longer / COARSE))
         lab = colours.values.numpy()
         gx = np.stack([cv2.Sobel(plane, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for plane in lab])
         gy = np.stack([cv2.Sobel(plane, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8) for plane in lab])

@@ -78,8 +78,10 @@ def equation2(evidence: Evidence, features: FeatureMap, numbers: Tensor) -> Tens
     i, j = torch.meshgrid(steps, steps, indexing="ij")
     u, v = numbers[:, None, None, 2:4], numbers[:, None, None, 4:6]
     plane = i[None, :, :, None] * u + j[None, :, :, None] * v
-    matrix = features.map_from_photo @ image_from_plane(
-        numbers[:, 0], numbers[:, 1], size=size, focal_mm=evidence.focal_mm
+    matrix = (
+        features.map_from_photo
+        @ evidence.part.from_photo
+        @ image_from_plane(numbers[:, 0], numbers[:, 1], size=size, focal_mm=evidence.focal_mm)
     )
     side = len(steps)
     points, front = project(matrix, plane.flatten(1, 2))

@@ -20,7 +20,6 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import Cells, Frames, frames, read, sample_px
 from p3i.search.propose.views import depth_of_view, view_canvas
 from p3i.search.propose.votes import gradient_tensor
-from p3i.vision.warp import in_frame
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -122,7 +121,7 @@ def _around(evidence: Evidence, base: BaseRing, side: float) -> Around | None:
         return None
     fit, pattern = base.fit, base.fit.filling.pattern
     own = frames(pattern, fit.theta, fit.index, side=side)
-    radii = np.arange(0.5 * side, _MOST_RADIUS, _RADIUS_STEP * side)
+    radii = np.arange(0.5 * side, _MOST_RADIUS * evidence.part.share, _RADIUS_STEP * side)
     angles = np.radians(base.phase_deg + np.arange(2 * slots) * base.step_deg / 2)
     r, angle = np.meshgrid(radii, angles, indexing="ij")
     out = np.stack([np.cos(angle), np.sin(angle)], -1).reshape(-1, 2)
@@ -132,7 +131,7 @@ def _around(evidence: Evidence, base: BaseRing, side: float) -> Around | None:
     size = evidence.image.size
     matrix = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm)
     at, in_front = project(matrix, origin)
-    seen = in_front & in_frame(at, size)
+    seen = in_front & evidence.part.shows(at)
     every = Frames(
         torch.cat([own.origin, origin[seen]]),
         torch.cat([own.along, along[seen]]),
@@ -273,7 +272,9 @@ def _alike_when_shifted(evidence: Evidence, base: BaseRing) -> tuple[Floats, flo
     fit, pattern = base.fit, base.fit.filling.pattern
     size = evidence.image.size
     seen = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm).numpy()
-    canvas = view_canvas(seen, size, side=_CANVAS, depth_range=_DEPTH_RANGE)
+    part = evidence.part
+    part_from_plane = part.from_photo.numpy() @ seen
+    canvas = view_canvas(part_from_plane, part.size, side=_CANVAS, depth_range=_DEPTH_RANGE)
     if canvas is None:
         return None
     unit = canvas.unit

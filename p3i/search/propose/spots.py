@@ -57,7 +57,7 @@ class _Spots:
 
 def circle_seeds(evidence: Evidence, generator: np.random.Generator) -> list[CircleSeed]:
     """The circles through spots that look alike, the most telling first: two for each ellipse."""
-    colours = evidence.colours_for(evidence.image.size.longer / _LONGER)
+    colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
     lab = colours.lab
     spots = _spots(lab, colours.valid.numpy())
     if len(spots.at) < _FEWEST:

@@ -85,7 +85,8 @@ class RingProposal:
 
 def rotation_votes(evidence: Evidence) -> list[Vote]:
     """The centres that rotations speak for, at most a few for each pose, the most votes first."""
-    colours = evidence.colours_for(evidence.image.size.longer / (2.5 * _CANVAS))
+    part = evidence.part
+    colours = evidence.colours_for(part.size.longer / (2.5 * _CANVAS))
     known = colours.valid.numpy().astype(np.float32)
     size, map_from_photo = evidence.image.size, colours.map_from_photo.numpy()
     found: list[Vote] = []
@@ -101,7 +102,7 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
         for place in np.argsort(-votes[rows, columns])[:_MOST_OF_POSE]:
             at = np.linalg.inv(map_from_photo) @ map_from_view @ [columns[place], rows[place], 1.0]
             center = at[:2] / at[2]
-            if (np.abs(center - size.middle) < 0.53 * np.array([size.width, size.height])).all():
+            if (np.abs(center - part.middle) < 0.53 * np.array([part.size.width, part.size.height])).all():
                 found.append(Vote(float(votes[rows[place], columns[place]]), rx_deg, ry_deg, center))
     return sorted(found, key=lambda vote: -vote.worth)
 
@@ -112,7 +113,7 @@ def ring_proposals(evidence: Evidence, *, seed: int = 0) -> list[RingProposal]:
     `seed` is that of the draws of spots.
     """
     centres: list[tuple[Vote, list[Rows]]] = []
-    for votes in _by_centre(rotation_votes(evidence), evidence.image.size.longer):
+    for votes in _by_centre(rotation_votes(evidence), evidence.part.size.longer):
         centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
     for circle in circle_seeds(evidence, np.random.default_rng(seed)):
         vote = Vote(_SPOTS_WORTH, circle.rx_deg, circle.ry_deg, circle.center_px)

@@ -36,7 +36,7 @@ def test_another_plane_is_told_of_with_its_place() -> None:
     of_left = pose_error_deg(result.program, small_scene(LEFT).program)
     of_right = pose_error_deg(result.program, small_scene(RIGHT).program)
     assert min(of_left, of_right) < 3
-    said = re.compile(r"another plane carries a pattern, around \((\d+), (\d+)\)")
+    said = re.compile(r"another plane carries a pattern, around \((\d+), (\d+)\): .+")
     told = [said.fullmatch(note) for note in result.notes]
     place = next((match for match in told if match), None)
     assert place is not None, result.notes
@@ -46,7 +46,7 @@ def test_another_plane_is_told_of_with_its_place() -> None:
 
 
 def place_told(notes: tuple[str, ...]) -> tuple[float, float]:
-    said = re.compile(r"another plane carries a pattern, around \((-?\d+), (-?\d+)\)")
+    said = re.compile(r"another plane carries a pattern, around \((-?\d+), (-?\d+)\): .+")
     (told,) = [match for note in notes if (match := said.fullmatch(note))]
     return float(told[1]), float(told[2])
 
