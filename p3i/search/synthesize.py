@@ -15,6 +15,7 @@ from p3i.search.config import SearchConfig
 from p3i.search.families import FAMILIES
 from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
 from p3i.search.judge.bits import by_explained
+from p3i.search.judge.probability import Signs, probability
 from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
 from p3i.search.look.evidence import FINE, Evidence
@@ -99,15 +100,17 @@ def _result(
         reason = StopReason.COSTS_MORE if seen else StopReason.OUT_OF_SIGHT if sure else why_not(config)
         if session.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
-        refused = _told(config, assumed, None, session.stopped or reason, score=best, needed=needed)
+        bits = max((answer.worth for answer in told), default=None)
+        stop = session.stopped or reason
+        refused = _told(config, assumed, None, stop, agreement=best, bits=bits, needed=needed)
         session.record("answer", program=None, score=best, reason=refused.reason)
         return refused
     good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
     first = good[0]
-    runner_up = max((answer.worth for answer in good[1:]), default=0.0)
-    margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
+    signs = [_signs(session, answer, good) for answer in good[: config.top]]
+    margin_bits, sigma_deg = signs[0].margin_bits, signs[0].pose_sigma_deg
+    margin = min(max(margin_bits / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(session, first)
-    sigma_deg = pose_sigma_deg(session.evidence, first)
     doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
     ambiguity = None if other is None else ambiguity_note(other)
     notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
@@ -127,19 +130,24 @@ def _result(
         first.program,
         session.stopped or StopReason.FOUND,
         structure=first.structure,
-        score=first.score,
+        score=probability(signs[0]),
+        agreement=first.score,
+        bits=first.worth,
+        margin_bits=margin_bits,
         margin=margin,
         needed=needed if by_score else None,
         false_alarms=false_alarms(first.structure, first.worth),
         candidates=tuple(
             Candidate(
                 program=answer.program,
-                score=answer.score,
+                score=probability(told_by),
+                agreement=answer.score,
+                bits=answer.worth,
                 structure=answer.structure,
                 false_alarms=false_alarms(answer.structure, answer.worth),
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
-            for answer in good[: config.top]
+            for answer, told_by in zip(good, signs, strict=False)
         ),
         centers=centers,
         region=region_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1),
@@ -148,6 +156,20 @@ def _result(
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
         notes=notes,
         **_focal_facts(first, assumed),
+    )
+
+
+def _signs(session: Session, answer: Answer, good: list[Answer]) -> Signs:
+    """What one of the good answers is judged by when people are told how likely it is right."""
+    image, focal_mm = session.evidence.image, answer.focal_mm or session.evidence.focal_mm
+    rivals = [other.worth for other in good if other is not answer]
+    return Signs(
+        structure=answer.structure,
+        bits=answer.worth,
+        objects=len(centers_px(answer.program, image, focal_mm, lens_k1=answer.lens_k1)),
+        agreement=answer.score,
+        margin_bits=answer.worth - max(rivals, default=0.0),
+        pose_sigma_deg=pose_sigma_deg(session.evidence, answer),
     )
 
 

@@ -34,7 +34,7 @@ def session_on(ring: DrawnRing) -> Session:
 def test_auto_answers_a_ring_with_its_ring() -> None:
     result = synthesize(RING.image(), SearchConfig(focal_mm=35.0))
     assert result.stop is StopReason.FOUND and result.structure == "circular"
-    assert result.program is not None and result.score is not None and result.score >= NEEDED
+    assert result.program is not None and result.agreement is not None and result.agreement >= NEEDED
     assert len(points(result.program)) == RING.count
     assert tilt_error_deg(result.program, RING.rx_deg, RING.ry_deg) < 1
     found = np.array([(x, y) for x, y, _, _ in result.centers])
