@@ -71,8 +71,9 @@ def command(**given: Any) -> int:
     PHOTO is a file, a glob, a folder, @LIST (a text file of such names) or - (stdin).
 
     Prints the program of a single photo on stdout. Its `score` is how likely it is right: of answers that
-    say 0.9, nine in ten are (structure, lattice, and tilt within 2 degrees). Exits with 5 where there is no regular pattern, and with 6
-    where only some of many photos have one. Ctrl-C prints the best program so far.
+    say 0.9, nine in ten are (structure, lattice, and tilt within 2 degrees). Exits with 5 where there is
+    no regular pattern, and with 6 where only some of many photos have one. Ctrl-C prints the best program
+    so far.
     """
     return run(Call.of(given))
 
