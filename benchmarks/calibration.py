@@ -196,9 +196,8 @@ def fit(rows: Array, right: Array, weights: Array) -> Fitted:
     is of each term at its own spread, and leaves the first (1 for every answer) free.
     """
     spread = rows.std(0)
-    prior = np.where(spread > 0, spread**2, 0.0) / PRIOR_SPREAD**2
-    prior[0] = 1e-6
-    found = np.zeros(rows.shape[1])
+    prior = np.maximum(spread**2 / PRIOR_SPREAD**2, 1e-6)
+    found, bend = np.zeros(rows.shape[1]), np.diag(prior)
     for _ in range(50):
         likely = 1 / (1 + np.exp(-np.clip(rows @ found, -30, 30)))
         slope = rows.T @ (weights * (right - likely)) - prior * found
