@@ -1,11 +1,11 @@
-"""Scores of pictures without a pattern and with one: what `p3i.synth` refuses, rightly and wrongly.
+"""Agreement on pictures without a pattern and with one: what `p3i.synth` refuses, rightly and wrongly.
 
 python benchmarks/refusals.py                          # 210 crops without a pattern, 100 pictures with one
 python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then photos with a pattern
-python benchmarks/refusals.py --out scores.json        # every score, by kind of pattern
+python benchmarks/refusals.py --out scores.json        # every agreement, by kind of pattern
 
-Every family of the search (lattices, rings, ...) looks at every picture, and the best score that each reaches
-is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the score and
+Every family of the search (lattices, rings, ...) looks at every picture, and the best agreement that each
+reaches is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the agreement and
 more bits than the program costs, or by the number of false alarms (docs/search.md). The crops are drawn from
 a seed (benchmarks/pattern_free.py), so every run sees the same. It needs scikit-image (the extra `bench`),
 but downloads nothing.
