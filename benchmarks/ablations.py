@@ -195,7 +195,7 @@ COLUMNS = (
 
 
 def measured(photo: Path, truth: Truth, configuration: Configuration) -> dict[str, Any]:
-    """One search: the photo's measures (the worst without an answer), why none, its agreement, CPU seconds."""
+    """One search: the photo's measures (the worst without an answer), why none, agreement, CPU seconds."""
     begun = time.process_time()
     found, error, score = Measures(lattice_ok=False), "", None
     try:

@@ -1,15 +1,16 @@
 """The printed score as a probability: fitted to answers of known truth, and held to it.
 
-python benchmarks/calibration.py scenes SCENES.jsonl --count 300   # search rendered scenes, half of them hard
-p3i synth SET/images --format jsonl > PHOTOS.jsonl                 # and annotated photos
-python benchmarks/calibration.py fit --set SET PHOTOS.jsonl --scenes SCENES.jsonl
+python benchmarks/calibration.py photos SET PHOTOS.jsonl --count 300   # annotated photos, most of them spoilt
+python benchmarks/calibration.py scenes SCENES.jsonl --count 300       # and rendered scenes
+python benchmarks/calibration.py fit --photos PHOTOS.jsonl --scenes SCENES.jsonl
 
-`scenes` adds to a file that is there already, a line a scene, and may be stopped and begun again. `fit`
+The first two add a line a picture to a file that is there already: they may be stopped, begun again, and
+shared among processes (--first, --count, a file each). Pictures are spoilt so that wrong answers exist. `fit`
 prints the coefficients of p3i/search/judge/probability.py, each with its standard error, and the reliability
 diagram: answers in ten bins of the probability that they are told, with the share of them that is right. What
 the diagram tells of an answer comes from coefficients that were fitted without its half of the photos and
-scenes (`p3i eval --fold`). `check` draws the same diagram of the scores that the answers carry, and fits
-nothing.
+scenes (as of `p3i eval --fold`). `check` draws the same diagram of the scores that the answers carry, and
+fits nothing.
 
 Refused pictures have no score and are left out. Photos count as much as scenes: an answer of the fewer kind
 weighs more.
@@ -18,11 +19,12 @@ weighs more.
 import argparse
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import robustness
 
@@ -31,11 +33,11 @@ from p3i.evaluation.folds import Fold
 from p3i.evaluation.looks import Random, texture
 from p3i.evaluation.measures import measure
 from p3i.evaluation.scenes import Scene, annotation, scene
-from p3i.evaluation.score_set import read_results
-from p3i.evaluation.truth import Truth, read_truth, truth_of
+from p3i.evaluation.truth import Truth, truth_of
 from p3i.grammar.ast import Program
 from p3i.search.judge.probability import COEFFICIENTS, RIGHT_WITHIN_DEG, Signs, terms
 from p3i.search.result import StructureFound
+from p3i.vision.image import Image
 
 Array = np.ndarray
 
@@ -47,71 +49,123 @@ PRIOR_SPREAD = 2.0
 
 
 STRUCTURES: tuple[StructureFound, ...] = ("lattice", "circular", "lattice", "hybrid", "circular")
-HARMS: tuple[tuple[str, tuple[float, ...]], ...] = (
-    ("blur", (2.5, 5.0)),
-    ("noise", (0.1, 0.3)),
-    ("faint", (0.15, 0.06)),
-    ("occlusion", (0.3, 0.6)),
-    ("jpeg", (8.0,)),
-    ("light", (12.0,)),
-    ("part", (0.5, 0.3)),
+HARMS: tuple[tuple[str, float, float], ...] = (
+    ("none", 0, 0),
+    ("blur", 3, 8),
+    ("noise", 0.1, 0.4),
+    ("faint", 0.2, 0.04),
+    ("covered", 0.3, 0.7),
+    ("part", 0.4, 0.1),
+    ("small", 0.5, 0.2),
 )
-"""What hard scenes suffer afterwards; lattices besides, or instead, all of benchmarks/robustness.py."""
+"""What is done to photos and scenes, by turns, between which amounts: pixels of blur (at 640), the spread of
+noise, the contrast that is left, the share covered by blobs, the share that is known, the side that is left.
+"""
 
 
-def spoilt_scene(number: int) -> tuple[str, Scene]:
-    """Scene `number` and what was done to it: every second block of five is spoilt, by turns."""
+def spoilt(image: Image, turn: int, seed: int) -> tuple[str, Image]:
+    """A picture after the harm whose turn it is, and what that was."""
+    random = np.random.default_rng([FIRST_SEED, seed])
+    harm, mild, hard = HARMS[turn % len(HARMS)]
+    if harm == "none":
+        return harm, image
+    amount = mild * (hard / mild) ** float(random.uniform())
+    pixels, valid = image.pixels, image.valid
+    if harm == "blur":
+        pixels = cv2.GaussianBlur(pixels, (0, 0), amount * image.size.longer / 640)
+    elif harm == "noise":
+        pixels = pixels + random.normal(0, amount, pixels.shape)
+    elif harm == "faint":
+        pixels = 0.5 + amount * (pixels - pixels.mean()) + random.normal(0, 0.03, pixels.shape)
+    elif harm == "covered":
+        pixels = _covered(pixels, amount, random)
+    elif harm == "part":
+        valid = valid & _part(image, amount, random)
+    else:
+        size = (round(image.size.width * amount), round(image.size.height * amount))
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+        valid = cv2.resize(valid.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+    pixels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.float32) / 255
+    return f"{harm} {amount:.2g}", replace(image, pixels=np.ascontiguousarray(pixels), valid=valid)
+
+
+def _covered(pixels: Array, share: float, random: Random) -> Array:
+    """Blobs of an uneven colour, as of leaves or people, over a share of the picture."""
+    height, width = pixels.shape[:2]
+    hidden, longer = np.zeros((height, width), np.uint8), max(height, width)
+    while hidden.mean() < share:
+        middle = (int(random.integers(width)), int(random.integers(height)))
+        sides = (int(longer * random.uniform(0.03, 0.1)), int(longer * random.uniform(0.03, 0.1)))
+        cv2.ellipse(hidden, middle, sides, float(random.uniform(0, 180)), 0, 360, 1, -1)
+    return np.where(hidden[..., None] > 0, texture(random, height, width), pixels)
+
+
+def _part(image: Image, share: float, random: Random) -> Array:
+    """A rectangle of so much of the picture, anywhere: bool [H, W]."""
+    height, width = image.valid.shape
+    tall, wide = round(math.sqrt(share) * height), round(math.sqrt(share) * width)
+    y, x = int(random.integers(height - tall + 1)), int(random.integers(width - wide + 1))
+    known = np.zeros((height, width), bool)
+    known[y : y + tall, x : x + wide] = True
+    return known
+
+
+def scene_of(number: int) -> tuple[str, Scene, Image]:
+    """Scene `number`: what was done to it, its truth, its picture. Some lattices are of robustness.py."""
     structure, seed = STRUCTURES[number % len(STRUCTURES)], FIRST_SEED + number
-    block, hard = divmod(number // len(STRUCTURES), 2)
-    if not hard:
-        return f"{structure} plain", scene(structure, seed)
     random = np.random.default_rng([seed, 3])
     if structure == "lattice" and random.random() < 0.5:
         levels = [(harm, level) for harm, some in robustness.harms().items() for level in some]
         harm, level = levels[int(random.integers(len(levels)))]
-        return f"lattice {harm} {level}", robustness.harms()[harm][level](seed)
-    harm, amounts = HARMS[block % len(HARMS)]
-    amount = amounts[int(random.integers(len(amounts)))]
-    drawn = scene(structure, seed)
-    pixels = _spoilt(drawn, harm, amount, random)
-    whole = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
-    return f"{structure} {harm} {amount:g}", replace(drawn, pixels=whole, jpeg=None)
+        drawn = robustness.harms()[harm][level](seed)
+        return f"lattice {harm} {level}", drawn, drawn.image()
+    drawn = scene(structure, seed, **({"focals": True} if structure == "circular" else {}))
+    name, image = spoilt(drawn.image(), number // len(STRUCTURES), number)
+    return f"{structure} {name}", drawn, image
 
 
-def _spoilt(drawn: Scene, harm: str, amount: float, random: Random) -> Array:
-    """The pixels of a scene after a harm, float [H, W, 3]."""
-    pixels = drawn.pixels.astype(np.float32) / 255
-    if harm == "faint":  # all greys alike but for a little, and the sensor's noise over that
-        faint = 0.5 + amount * (pixels - pixels.mean())
-        return faint + random.normal(0, 0.03, pixels.shape).astype(np.float32)
-    if harm == "part":  # a wall before all but a part of the picture
-        height, width = pixels.shape[:2]
-        tall, wide = int(math.sqrt(amount) * height), int(math.sqrt(amount) * width)
-        y, x = int(random.integers(height - tall + 1)), int(random.integers(width - wide + 1))
-        wall = texture(random, height, width)
-        wall[y : y + tall, x : x + wide] = pixels[y : y + tall, x : x + wide]
-        return wall
-    return robustness.AFTERWARDS[harm](drawn, amount, random)
+def search_scenes(out: Path, numbers: Iterable[int]) -> None:
+    """Search scenes and add a line for each to `out`: the answer, and the truth beside it."""
+    for number in _to_do(out, numbers):
+        harm, drawn, image = scene_of(number)
+        name = f"{number:04}"
+        # The truth of a scene is known to the last digit, however well its objects tell it.
+        truth = annotation(drawn, name) | {"pose_reliable": True}
+        _searched(out, image, {"image": name, "number": number, "harm": harm, "truth": truth})
 
 
-def search_scenes(out: Path, *, count: int, first: int = 0) -> None:
-    """Search scenes `first` to `count` and add a line for each to `out`: answer, and truth beside it."""
+def search_photos(folder: Path, out: Path, numbers: Iterable[int]) -> None:
+    """Search annotated photos and add a line for each to `out`.
+
+    Photo and harm follow from the number: the first numbers are the photos as they are, one after another;
+    the next are all of them again, spoilt by turns; and so on, until each has suffered everything.
+    """
+    entries = json.loads((folder / "annotations.json").read_text(encoding="utf-8"))
+    for number in _to_do(out, numbers):
+        again, which = divmod(number, len(entries))
+        entry = entries[which]
+        photo = folder / entry["file"]
+        photo = photo if photo.is_file() else folder / "images" / photo.name
+        turn = 0 if again == 0 else 1 + (which + again) % (len(HARMS) - 1)
+        harm, image = spoilt(p3i.read_image(photo), turn, number)
+        name = f"{number:04} {Path(entry['file']).name}"
+        _searched(out, image, {"image": name, "number": number, "harm": harm, "truth": entry})
+
+
+def _to_do(out: Path, numbers: Iterable[int]) -> Iterator[int]:
+    """Those of the numbers that have no line in `out` yet."""
     done = {record["number"] for record in _lines(out)} if out.exists() else set()
+    return (number for number in numbers if number not in done)
+
+
+def _searched(out: Path, image: Image, told: dict[str, Any]) -> None:
+    """Search a picture and add a line to `out`: what `synth --format jsonl` says, and what is told of it."""
+    result = p3i.synth(image)
+    answer = {"program": None, "error": result.reason} if result.program is None else result.record()
     with out.open("a", encoding="utf-8") as stream:
-        for number in range(first, count):
-            if number in done:
-                continue
-            name, drawn = spoilt_scene(number)
-            result = p3i.synth(drawn.image())
-            told: dict[str, Any] = {"program": None, "error": result.reason}
-            if result.program is not None:
-                told = result.record()
-            told |= {"image": f"{number:04}", "number": number, "harm": name}
-            told["truth"] = annotation(drawn, f"{number:04}")
-            stream.write(json.dumps(told) + "\n")
-            stream.flush()
-            said = "refused" if result.program is None else f"{result.structure}, score {result.score:.2f}"
-            print(f"{number:4} {name:28} {said}", flush=True)
+        stream.write(json.dumps(answer | told) + "\n")
+    said = "refused" if result.program is None else f"{result.structure}, score {result.score:.2f}"
+    print(f"{told['image']:30} {told['harm']:24} {said}", flush=True)
 
 
 def _lines(path: Path) -> Iterator[dict[str, Any]]:
@@ -131,18 +185,19 @@ class Told:
     right: bool
 
 
-def told_answers(source: str, folder_truths: Sequence[Truth], records: Mapping[str, Any]) -> list[Told]:
-    """The answers among the records of a set, by the photo's name, each held to its truth."""
-    first = {truth.file for truth in Fold(1, 2).of(folder_truths)}
+def told_answers(source: str, records: Sequence[Mapping[str, Any]]) -> list[Told]:
+    """The answers among the lines of a journal, each held to its truth and in the fold of its photo."""
+    truths = {truth.file: truth for truth in (truth_of(record["truth"]) for record in records)}
+    first = {truth.file for truth in Fold(1, 2).of(list(truths.values()))}
     found = []
-    for truth in folder_truths:
-        record = records.get(Path(truth.file).name) or {}
-        program = p3i.loads(record["program"]) if record.get("program") else None
-        if program is None:
+    for record in records:
+        if not record.get("program"):
             continue
-        fold = 1 if truth.file in first else 2
-        right = is_right(program, truth)
-        found.append(Told(source, truth.file, fold, signs_of(record), float(record["score"]), right))
+        truth = truth_of(record["truth"])
+        fold, score = 1 if truth.file in first else 2, float(record["score"])
+        right = is_right(p3i.loads(record["program"]), truth)
+        name = f"{record['image']} {record['harm']}"
+        found.append(Told(source, name, fold, signs_of(record), score, right))
     return found
 
 
@@ -261,39 +316,41 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     verbs = parser.add_subparsers(dest="verb", required=True)
-    made = verbs.add_parser("scenes", help="search rendered scenes, and write answers with their truth")
-    made.add_argument("out", type=Path)
-    made.add_argument("--count", type=int, default=300, help="scenes up to this number")
-    made.add_argument("--first", type=int, default=0, help="from this number on")
-    for name, what in (
-        ("fit", "fit the coefficients, cross-fitted"),
-        ("check", "hold answers to their scores"),
-    ):
-        verb = verbs.add_parser(name, help=what)
-        verb.add_argument("answers", type=Path, nargs="?", help="JSON lines of synth over the photos of SET")
-        verb.add_argument("--set", type=Path, help="the annotated photos")
+    scenes = verbs.add_parser("scenes", help="search rendered scenes")
+    photos = verbs.add_parser("photos", help="search annotated photos, as they are and spoilt")
+    photos.add_argument("set", type=Path)
+    for verb in (scenes, photos):
+        verb.add_argument("out", type=Path, help="JSON lines, added to")
+        verb.add_argument("--count", type=int, default=300, help="up to this number")
+        verb.add_argument("--first", type=int, default=0, help="from this number on")
+    fitted = verbs.add_parser("fit", help="fit the coefficients, and draw the diagram, cross-fitted")
+    checked = verbs.add_parser("check", help="draw the diagram of the scores that answers carry")
+    for verb in (fitted, checked):
+        verb.add_argument("--photos", type=Path, nargs="*", default=[], help="what `photos` wrote")
         verb.add_argument("--scenes", type=Path, nargs="*", default=[], help="what `scenes` wrote")
         verb.add_argument("--list", action="store_true", help="every answer that is wrong or told below 0.5")
     given = parser.parse_args()
     if given.verb == "scenes":
-        search_scenes(given.out, count=given.count, first=given.first)
-        return
-    told: list[Told] = []
-    if given.answers is not None:
-        told += told_answers("photos", read_truth(given.set), read_results(given.answers))
-    if given.scenes:
-        records = [record for path in given.scenes for record in _lines(path)]
-        truths = [truth_of(record["truth"]) for record in records]
-        told += told_answers("scenes", truths, {record["image"]: record for record in records})
-    scores = np.array([one.score for one in told])
-    likely = cross_fitted(told) if given.verb == "fit" else scores
-    if given.verb == "fit":
+        search_scenes(given.out, range(given.first, given.count))
+    elif given.verb == "photos":
+        search_photos(given.set, given.out, range(given.first, given.count))
+    else:
+        told: list[Told] = []
+        for source, paths in (("photos", given.photos), ("scenes", given.scenes)):
+            told += told_answers(source, [record for path in paths for record in _lines(path)])
+        _report(told, fitting=given.verb == "fit", listing=given.list)
+
+
+def _report(told: Sequence[Told], *, fitting: bool, listing: bool) -> None:
+    """Coefficients if they are to be fitted, and the diagrams."""
+    likely = cross_fitted(told) if fitting else np.array([one.score for one in told])
+    if fitting:
         _print_coefficients(told)
     for source in sorted({one.source for one in told}):
         own = [k for k, one in enumerate(told) if one.source == source]
         diagram(source, [told[k] for k in own], likely[own])
     diagram("all, photos and scenes with equal weight", told, likely)
-    if given.list:
+    if listing:
         for one, said in sorted(zip(told, likely, strict=True), key=lambda pair: pair[1]):
             if said < 0.5 or not one.right:
                 what = "right" if one.right else "wrong"

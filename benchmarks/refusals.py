@@ -5,10 +5,10 @@ python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then
 python benchmarks/refusals.py --out scores.json        # every agreement, by kind of pattern
 
 Every family of the search (lattices, rings, ...) looks at every picture, and the best agreement that each
-reaches is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the agreement and
-more bits than the program costs, or by the number of false alarms (docs/search.md). The crops are drawn from
-a seed (benchmarks/pattern_free.py), so every run sees the same. It needs scikit-image (the extra `bench`),
-but downloads nothing.
+reaches is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the
+agreement and more bits than the program costs, or by the number of false alarms (docs/search.md). The crops
+are drawn from a seed (benchmarks/pattern_free.py), so every run sees the same. It needs scikit-image (the
+extra `bench`), but downloads nothing.
 """
 
 import argparse

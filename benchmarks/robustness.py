@@ -12,7 +12,7 @@ import dataclasses
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -136,18 +136,6 @@ def _covered(scene: Scene, share: float, random: Random) -> np.ndarray:
         pixels[blob] = ground[blob]
         hidden[blob] = 1
     return pixels
-
-
-Harm = Callable[[Scene, float, Random], np.ndarray]
-AFTERWARDS: Mapping[str, Harm] = {
-    "blur": _blurred,
-    "jpeg": _compressed,
-    "noise": _noisy,
-    "light": _lit,
-    "vignette": _vignetted,
-    "occlusion": _covered,
-}
-"""Harms that may be done to the finished picture of any scene: its pixels afterwards, about 0..1."""
 
 
 def _relaid(*, missing: float = 0.0, jitter: float = 0.3) -> Spoilt:

@@ -1,13 +1,16 @@
 """The fit of the score finds the odds that made the answers; its diagram tells who promises too much."""
 
 import importlib
+import json
 import types
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from test_benchmarks import SCRIPTS
 
+import p3i
 from p3i.evaluation.annotations import annotation
 from p3i.evaluation.scenes import scene
 from p3i.evaluation.truth import truth_of
@@ -89,7 +92,9 @@ def test_answers_are_read_off_the_lines_of_synth_and_held_to_the_truth(calibrati
         pose_sigma_deg=0.3,
         centers=((1.0, 2.0, 0, 0), (3.0, 4.0, 0, 1)),
     )
-    (told,) = calibration.told_answers("photos", [truth], {"a.png": result.record()})
+    line = result.record() | {"image": "0000 a.png", "harm": "none", "truth": annotation(drawn, "a.png")}
+    refused = line | {"program": None}
+    (told,) = calibration.told_answers("photos", [line, refused])
     assert told.right and (told.score, told.fold) == (0.8, 1)
     assert told.signs == Signs(
         structure="lattice", bits=321.0, objects=2, agreement=0.4, margin_bits=21.0, pose_sigma_deg=0.3
@@ -97,4 +102,22 @@ def test_answers_are_read_off_the_lines_of_synth_and_held_to_the_truth(calibrati
     camera = replace(drawn.program.camera, rx_deg=drawn.program.camera.rx_deg + 3)
     assert not calibration.is_right(replace(drawn.program, camera=camera), truth)
     assert calibration.is_right(replace(drawn.program, camera=camera), replace(truth, pose_reliable=False))
-    assert calibration.told_answers("photos", [truth], {"a.png": {"program": None}}) == []
+
+
+def test_a_photo_comes_as_it_is_first_and_is_spoilt_by_turns_later(
+    calibration: types.ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A journal goes on where it ended, and a photo stays in its half whatever was done to it."""
+    p3i.examples(tmp_path, lattices=2, rings=0, hybrids=0)
+    nothing = SynthesisResult(program=None, stop=StopReason.NO_PATTERN)
+    seen: list[np.ndarray] = []
+    monkeypatch.setattr(p3i, "synth", lambda image: seen.append(image.pixels) or nothing)
+    out = tmp_path / "journal.jsonl"
+    calibration.search_photos(tmp_path, out, range(2))
+    calibration.search_photos(tmp_path, out, range(12))
+    records = [json.loads(line) for line in out.read_text().splitlines()]
+    assert [record["number"] for record in records] == list(range(12)) and len(seen) == 12
+    assert [record["harm"] for record in records[:2]] == ["none", "none"]
+    first = {record["harm"].split()[0] for record in records[2:] if record["number"] % 2 == 0}
+    assert "none" not in first and len(first) == 5
+    assert {record["truth"]["file"] for record in records[::2]} == {"images/lattice_000.png"}
