@@ -161,12 +161,10 @@ def _result(
 
 def _signs(session: Session, answer: Answer, good: list[Answer]) -> Signs:
     """What one of the good answers is judged by when people are told how likely it is right."""
-    image, focal_mm = session.evidence.image, answer.focal_mm or session.evidence.focal_mm
     rivals = [other.worth for other in good if other is not answer]
     return Signs(
         structure=answer.structure,
         bits=answer.worth,
-        objects=len(centers_px(answer.program, image, focal_mm, lens_k1=answer.lens_k1)),
         agreement=answer.score,
         margin_bits=answer.worth - max(rivals, default=0.0),
         pose_sigma_deg=pose_sigma_deg(session.evidence, answer),

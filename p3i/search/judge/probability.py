@@ -16,7 +16,6 @@ COEFFICIENTS: Mapping[str, float] = {
     "one": 0.0,
     "curve": 0.0,
     "bits": 0.0,
-    "each": 0.0,
     "agreement": 0.0,
     "tilt": 0.0,
     "margin": 0.0,
@@ -34,8 +33,7 @@ _MOST_DOUBLINGS = 6.0
 class Signs:
     """What an answer is judged by.
 
-    `bits`: what its program explains of the photo, less what it costs. `objects`: how many of it the photo
-    shows. `agreement`: the mean over the objects of how much better the others predict them than half a step
+    `bits`: what its program explains of the photo, less what it costs. `agreement`: the mean over the objects of how much better the others predict them than half a step
     away (judge/evaluate.py), 0 to 1. `margin_bits`: how much more it explains than the best answer that draws
     other objects; negative for a runner-up. `pose_sigma_deg`: how well its tilt is known, None where nothing
     tells.
@@ -43,7 +41,6 @@ class Signs:
 
     structure: StructureFound
     bits: float
-    objects: int
     agreement: float
     margin_bits: float
     pose_sigma_deg: float | None = None
@@ -59,9 +56,8 @@ def terms(signs: Signs) -> dict[str, float]:
     """The quantities that are weighed, by the names of COEFFICIENTS.
 
     `one`: 1 for every answer. `curve`: 1 where it is no lattice. `bits`: doublings of what it explains.
-    `each`: doublings of what an object of it explains, from one bit on. `agreement`: as it is. `tilt`: how
-    often the tilt is known twice as well as right answers need it. `margin`: the lead's share of the bits,
-    -1 to 1.
+    `agreement`: as it is. `tilt`: how often the tilt is known twice as well as right answers need it, less
+    than 0 where it is known worse. `margin`: the lead's share of the bits, -1 to 1.
     """
     bits = max(signs.bits, 1.0)
     sigma_deg = 90.0 if signs.pose_sigma_deg is None else max(signs.pose_sigma_deg, 1e-3)
@@ -69,7 +65,6 @@ def terms(signs: Signs) -> dict[str, float]:
         "one": 1.0,
         "curve": float(signs.structure != "lattice"),
         "bits": math.log2(bits),
-        "each": max(math.log2(bits / max(signs.objects, 1)), 0.0),
         "agreement": signs.agreement,
         "tilt": min(math.log2(RIGHT_WITHIN_DEG / sigma_deg), _MOST_DOUBLINGS),
         "margin": max(-1.0, min(signs.margin_bits / bits, 1.0)),

@@ -9,9 +9,7 @@ import pytest
 from p3i.search.judge import accept
 from p3i.search.judge.probability import COEFFICIENTS, Signs, probability, terms
 
-PLAIN = Signs(
-    structure="lattice", bits=400.0, objects=30, agreement=0.4, margin_bits=300.0, pose_sigma_deg=0.4
-)
+PLAIN = Signs(structure="lattice", bits=400.0, agreement=0.4, margin_bits=300.0, pose_sigma_deg=0.4)
 
 
 @pytest.mark.parametrize(
@@ -29,7 +27,7 @@ def test_more_evidence_makes_an_answer_likelier(better: dict[str, float]) -> Non
 
 
 def test_a_tilt_that_nothing_fixes_is_hardly_right() -> None:
-    lost = replace(PLAIN, structure="circular", bits=60.0, objects=7, agreement=0.14, pose_sigma_deg=20.0)
+    lost = replace(PLAIN, structure="circular", bits=60.0, agreement=0.14, pose_sigma_deg=20.0)
     assert probability(lost) < 0.5 < probability(PLAIN)
     assert probability(replace(lost, pose_sigma_deg=None)) <= probability(lost)
 
@@ -37,9 +35,7 @@ def test_a_tilt_that_nothing_fixes_is_hardly_right() -> None:
 @pytest.mark.parametrize("bits", [-1e9, 0.0, 1e-9, 1e12])
 @pytest.mark.parametrize("sigma_deg", [None, 0.0, 1e9])
 def test_any_signs_have_a_probability(bits: float, sigma_deg: float | None) -> None:
-    odd = Signs(
-        structure="hybrid", bits=bits, objects=0, agreement=0, margin_bits=-bits, pose_sigma_deg=sigma_deg
-    )
+    odd = Signs(structure="hybrid", bits=bits, agreement=0, margin_bits=-bits, pose_sigma_deg=sigma_deg)
     assert 0 <= probability(odd) <= 1
 
 
