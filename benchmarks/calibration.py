@@ -9,8 +9,8 @@ shared among processes (--first, --count, a file each). Pictures are spoilt so t
 prints the coefficients of p3i/search/judge/probability.py, each with its standard error, and the reliability
 diagram: answers in ten bins of the probability that they are told, with the share of them that is right. What
 the diagram tells of an answer comes from coefficients that were fitted without its half of the photos and
-scenes (as of `p3i eval --fold`). `check` draws the same diagram of the scores that the answers carry, and
-fits nothing.
+scenes (as of `p3i eval --fold`). `check` draws the same diagram of the scores as p3i says them, and fits
+nothing.
 
 Refused pictures have no score and are left out. Photos count as much as scenes: an answer of the fewer kind
 weighs more.
@@ -35,7 +35,7 @@ from p3i.evaluation.measures import measure
 from p3i.evaluation.scenes import Scene, annotation, scene
 from p3i.evaluation.truth import Truth, truth_of
 from p3i.grammar.ast import Program
-from p3i.search.judge.probability import COEFFICIENTS, RIGHT_WITHIN_DEG, Signs, terms
+from p3i.search.judge.probability import COEFFICIENTS, RIGHT_WITHIN_DEG, Signs, probability, terms
 from p3i.search.result import StructureFound
 from p3i.vision.image import Image
 
@@ -177,13 +177,12 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """An answer of known truth: where it is from, what it is judged by, its score, whether it is right."""
+    """An answer of known truth: where it is from, its fold, what it is judged by, whether it is right."""
 
     source: str
     name: str
     fold: int
     signs: Signs
-    score: float
     right: bool
 
 
@@ -199,10 +198,10 @@ def told_answers(source: str, records: Sequence[Mapping[str, Any]]) -> list[Told
         truth = truth_of(record["truth"])
         if not record.get("program") or not truth.pose_reliable:
             continue
-        fold, score = 1 if truth.file in first else 2, float(record["score"])
+        fold = 1 if truth.file in first else 2
         right = is_right(p3i.loads(record["program"]), truth)
         name = f"{record['image']} {record['harm']}"
-        found.append(Told(source, name, fold, signs_of(record), score, right))
+        found.append(Told(source, name, fold, signs_of(record), right))
     return found
 
 
@@ -327,7 +326,7 @@ def main() -> None:
         verb.add_argument("--count", type=int, default=300, help="up to this number")
         verb.add_argument("--first", type=int, default=0, help="from this number on")
     fitted = verbs.add_parser("fit", help="fit the coefficients, and draw the diagram, cross-fitted")
-    checked = verbs.add_parser("check", help="draw the diagram of the scores that answers carry")
+    checked = verbs.add_parser("check", help="draw the diagram of the scores as p3i says them")
     for verb in (fitted, checked):
         verb.add_argument("--photos", type=Path, nargs="*", default=[], help="what `photos` wrote")
         verb.add_argument("--scenes", type=Path, nargs="*", default=[], help="what `scenes` wrote")
@@ -346,7 +345,7 @@ def main() -> None:
 
 def _report(told: Sequence[Told], *, fitting: bool, listing: bool) -> None:
     """Coefficients if they are to be fitted, and the diagrams."""
-    likely = cross_fitted(told) if fitting else np.array([one.score for one in told])
+    likely = cross_fitted(told) if fitting else np.array([probability(one.signs) for one in told])
     if fitting:
         _print_coefficients(told)
     for source in sorted({one.source for one in told}):

@@ -33,10 +33,10 @@ _MOST_DOUBLINGS = 6.0
 class Signs:
     """What an answer is judged by.
 
-    `bits`: what its program explains of the photo, less what it costs. `agreement`: the mean over the objects of how much better the others predict them than half a step
-    away (judge/evaluate.py), 0 to 1. `margin_bits`: how much more it explains than the best answer that draws
-    other objects; negative for a runner-up. `pose_sigma_deg`: how well its tilt is known, None where nothing
-    tells.
+    `bits`: what its program explains of the photo, less what it costs. `agreement`: the mean over the objects
+    of how much better the others predict them than half a step away (judge/evaluate.py), 0 to 1.
+    `margin_bits`: how much more it explains than the best answer that draws other objects; negative for a
+    runner-up. `pose_sigma_deg`: how well its tilt is known, None where nothing tells.
     """
 
     structure: StructureFound
