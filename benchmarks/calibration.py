@@ -44,7 +44,7 @@ Array = np.ndarray
 FIRST_SEED = 700_000
 """Scenes of this seed and above are of no other benchmark."""
 BINS = 10
-PRIOR_SPREAD = 1.0
+PRIOR_SPREAD = 0.5
 """Coefficients of the terms, each scaled to a spread of 1, are about 0 give or take this much beforehand."""
 
 

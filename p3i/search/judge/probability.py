@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from p3i.search.result import StructureFound
 
 COEFFICIENTS: Mapping[str, float] = {
-    "one": 0.0,
-    "curve": 0.0,
-    "bits": 0.0,
-    "agreement": 0.0,
-    "tilt": 0.0,
-    "margin": 0.0,
+    "one": -1.95,
+    "curve": 0.11,
+    "bits": 0.13,
+    "agreement": 1.13,
+    "tilt": 0.57,
+    "margin": 0.14,
 }
 """What each of the `terms` adds to the log odds (base e) of an answer's being right."""
 
@@ -57,15 +57,14 @@ def terms(signs: Signs) -> dict[str, float]:
 
     `one`: 1 for every answer. `curve`: 1 where it is no lattice. `bits`: doublings of what it explains.
     `agreement`: as it is. `tilt`: how often the tilt is known twice as well as right answers need it, less
-    than 0 where it is known worse. `margin`: the lead's share of the bits, -1 to 1.
+    than 0 where it is known worse. `margin`: doublings of the lead, negative for a runner-up.
     """
-    bits = max(signs.bits, 1.0)
     sigma_deg = 90.0 if signs.pose_sigma_deg is None else max(signs.pose_sigma_deg, 1e-3)
     return {
         "one": 1.0,
         "curve": float(signs.structure != "lattice"),
-        "bits": math.log2(bits),
+        "bits": math.log2(max(signs.bits, 1.0)),
         "agreement": signs.agreement,
         "tilt": min(math.log2(RIGHT_WITHIN_DEG / sigma_deg), _MOST_DOUBLINGS),
-        "margin": max(-1.0, min(signs.margin_bits / bits, 1.0)),
+        "margin": math.copysign(math.log2(1 + abs(signs.margin_bits)), signs.margin_bits),
     }
