@@ -114,7 +114,7 @@ def test_what_has_no_pattern_is_refused_with_its_evidence(pixels: np.ndarray) ->
     assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
     assert result.centers == () and result.candidates == ()
     assert result.agreement is not None and result.agreement < NEEDED == result.needed
-    assert result.score is None and result.bits is not None
+    assert result.score is None and result.margin_bits is None
     assert result.reason == f"no regular pattern (best {result.agreement:.2f}, needs {NEEDED:.2f})"
 
 

@@ -13,20 +13,17 @@ from dataclasses import dataclass
 from p3i.search.result import StructureFound
 
 COEFFICIENTS: Mapping[str, float] = {
-    "one": -1.95,
-    "curve": 0.11,
-    "bits": 0.13,
-    "agreement": 1.13,
-    "tilt": 0.57,
-    "margin": 0.14,
+    "one": -1.99,
+    "curve": 0.14,
+    "bits": 0.11,
+    "agreement": 1.74,
+    "tilt": 0.52,
+    "margin": 0.13,
 }
 """What each of the `terms` adds to the log odds (base e) of an answer's being right."""
 
 RIGHT_WITHIN_DEG = 2.0
 """The pose of a right answer is at most so far from the true one."""
-
-# Terms are cut where more of the same says no more: a tilt known 64 times better than it need be.
-_MOST_DOUBLINGS = 6.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,12 +56,12 @@ def terms(signs: Signs) -> dict[str, float]:
     `agreement`: as it is. `tilt`: how often the tilt is known twice as well as right answers need it, less
     than 0 where it is known worse. `margin`: doublings of the lead, negative for a runner-up.
     """
-    sigma_deg = 90.0 if signs.pose_sigma_deg is None else max(signs.pose_sigma_deg, 1e-3)
+    sigma_deg = 90.0 if signs.pose_sigma_deg is None else max(signs.pose_sigma_deg, 0.01)
     return {
         "one": 1.0,
         "curve": float(signs.structure != "lattice"),
         "bits": math.log2(max(signs.bits, 1.0)),
         "agreement": signs.agreement,
-        "tilt": min(math.log2(RIGHT_WITHIN_DEG / sigma_deg), _MOST_DOUBLINGS),
+        "tilt": math.log2(RIGHT_WITHIN_DEG / sigma_deg),
         "margin": math.copysign(math.log2(1 + abs(signs.margin_bits)), signs.margin_bits),
     }
