@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from p3i.search.result import StructureFound
 
 COEFFICIENTS: Mapping[str, float] = {
-    "one": -1.99,
-    "curve": 0.14,
+    "one": -2.0,
+    "curve": 0.15,
     "bits": 0.11,
     "agreement": 1.74,
     "tilt": 0.52,
