@@ -195,13 +195,13 @@ COLUMNS = (
 
 
 def measured(photo: Path, truth: Truth, configuration: Configuration) -> dict[str, Any]:
-    """One search: the photo's measures (the worst without an answer), why none, its score, CPU seconds."""
+    """One search: the photo's measures (the worst without an answer), why none, agreement, CPU seconds."""
     begun = time.process_time()
     found, error, score = Measures(lattice_ok=False), "", None
     try:
         with configuration.applied():
             result = p3i.synth(photo, structure="lattice", features=configuration.features)
-        score = result.score
+        score = result.agreement
         if result.program is None:
             error = result.reason
         else:

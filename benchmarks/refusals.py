@@ -1,14 +1,14 @@
-"""Scores of pictures without a pattern and with one: what `p3i.synth` refuses, rightly and wrongly.
+"""Agreement on pictures without a pattern and with one: what `p3i.synth` refuses, rightly and wrongly.
 
 python benchmarks/refusals.py                          # 210 crops without a pattern, 100 pictures with one
 python benchmarks/refusals.py --crops 30 --scenes 0 PHOTOS   # fewer crops; then photos with a pattern
-python benchmarks/refusals.py --out scores.json        # every score, by kind of pattern
+python benchmarks/refusals.py --out scores.json        # every agreement, by kind of pattern
 
-Every family of the search (lattices, rings, ...) looks at every picture, and the best score that each reaches
-is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the score and
-more bits than the program costs, or by the number of false alarms (docs/search.md). The crops are drawn from
-a seed, so every run sees the same; a crop that shares more than half of their joint area with an earlier one
-of its photo is drawn anew. It needs scikit-image (the extra `bench`), but downloads nothing.
+Every family of the search (lattices, rings, ...) looks at every picture, and the best agreement that each
+reaches is kept, and the most bits. A picture counts as answered where `p3i.synth` would answer it: by the
+agreement and more bits than the program costs, or by the number of false alarms (docs/search.md). The crops
+are drawn from a seed (benchmarks/pattern_free.py), so every run sees the same. It needs scikit-image (the
+extra `bench`), but downloads nothing.
 """
 
 import argparse
@@ -24,6 +24,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import robustness
+from pattern_free import crops, folder
 
 import p3i
 from p3i.errors import P3IError
@@ -41,39 +42,7 @@ from p3i.size import Size
 from p3i.vision.image import Image
 from p3i.vision.threads import limit_threads
 
-PHOTOS = (
-    "astronaut.png",
-    "camera.png",
-    "cell.png",
-    "chelsea.png",
-    "clock_motion.png",
-    "coffee.png",
-    "grass.png",
-    "gravel.png",
-    "horse.png",
-    "hubble_deep_field.jpg",
-    "ihc.png",
-    "moon.png",
-    "motorcycle_left.png",
-    "motorcycle_right.png",
-    "retina.jpg",
-    "rocket.jpg",
-)
-"""Pictures of scikit-image without a repeating plane. Left out: coins, bricks, boards, lines of text,
-drawings, and what is smaller than the smallest crop."""
-
-FLAG_PX = 110
-"""The left part of the astronaut's photo holds a flag, whose stars and stripes are a pattern."""
-
-SIDES_PX = (176, 640)
 THRESHOLDS = (0.05, 0.08, 0.1, 0.12, 0.15, 0.18, 0.2, 0.25, 0.3, 0.35)
-
-
-MOST_SHARED = 0.5
-"""Crops of one photo share at most this part of the area that they cover together."""
-
-MOST_OF_ONE = 24
-"""Crops that one photo gives at most, or the largest would give half of all."""
 
 MILD = (
     ("none", "-"),
@@ -107,66 +76,6 @@ class Scores:
         return max(self.best.values(), default=0.0)
 
 
-def crops(count: int, seed: int) -> Iterator[tuple[str, Image]]:
-    """`count` crops with their names, in turn from every photo: place and sides (pixels) at random.
-
-    A photo that has no room for another distinct crop is passed over.
-    """
-    random = np.random.default_rng(seed)
-    taken: dict[str, list[tuple[int, int, int, int]]] = {name: [] for name in PHOTOS}
-    full: set[str] = set()
-    number = made = 0
-    while made < count and len(full) < len(PHOTOS):
-        name = PHOTOS[number % len(PHOTOS)]
-        number += 1
-        if len(taken[name]) >= MOST_OF_ONE:
-            full.add(name)
-        if name in full:
-            continue
-        photo = p3i.read_image(_folder() / name)
-        box = _distinct_box(photo, taken[name], random, left=FLAG_PX if name.startswith("astronaut") else 0)
-        if box is None:
-            full.add(name)
-            continue
-        taken[name].append(box)
-        made += 1
-        x, y, width, height = box
-        cut = (slice(y, y + height), slice(x, x + width))
-        image = Image(np.ascontiguousarray(photo.pixels[cut]), np.ascontiguousarray(photo.valid[cut]))
-        yield f"{Path(name).stem} {width}x{height}+{x}+{y}", image
-
-
-def _distinct_box(
-    photo: Image, taken: list[tuple[int, int, int, int]], random: np.random.Generator, *, left: int
-) -> tuple[int, int, int, int] | None:
-    """A new (x, y, width, height) beside those taken; None where 200 tries found no room."""
-    rows, columns = photo.valid[:, left:].shape
-    for _ in range(200):
-        height, width = (int(random.integers(SIDES_PX[0], SIDES_PX[1] + 1)) for _ in range(2))
-        height, width = min(height, rows), min(width, columns)
-        y = int(random.integers(0, rows - height + 1))
-        x = left + int(random.integers(0, columns - width + 1))
-        if all(_shared((x, y, width, height), other) <= MOST_SHARED for other in taken):
-            return x, y, width, height
-    return None
-
-
-def _shared(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> float:
-    """The area that two boxes share, of what they cover together."""
-    across = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-    down = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-    both = max(0, across) * max(0, down)
-    return both / (a[2] * a[3] + b[2] * b[3] - both)
-
-
-def _folder() -> Path:
-    try:
-        import skimage.data
-    except ImportError:
-        sys.exit("this benchmark needs scikit-image: pip install 'p3i[bench]'")
-    return Path(skimage.data.__file__).parent
-
-
 def scenes(count: int) -> Iterator[tuple[str, Image]]:
     """`count` rendered lattices, mildly spoilt in turn; seeds that benchmarks/robustness.py does not use."""
     harms = robustness.harms()
@@ -178,7 +87,7 @@ def scenes(count: int) -> Iterator[tuple[str, Image]]:
 
 def boards() -> Iterator[tuple[str, Image]]:
     """The board that scikit-image ships, seen under eight cameras. (Its bricks lie in no lattice.)"""
-    size, plane = Size(640, 480), p3i.read_image(_folder() / "chessboard_GRAY.png").pixels
+    size, plane = Size(640, 480), p3i.read_image(folder() / "chessboard_GRAY.png").pixels
     units = 130 / max(plane.shape[:2])  # of the plane, for a pixel of the board
     middle = np.array([plane.shape[1] - 1, plane.shape[0] - 1]) / 2
     plane_from_board = np.array([[units, 0, -units * middle[0]], [0, units, -units * middle[1]], [0, 0, 1.0]])

@@ -10,10 +10,12 @@ import types
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 import p3i
+from p3i.search.result import StopReason, SynthesisResult
 from p3i.vision.image import Image
 
 SCRIPTS = sorted((Path(__file__).parent.parent / "benchmarks").glob("*.py"))
@@ -79,3 +81,58 @@ def test_the_search_of_the_filling_benchmark_sees_no_hidden_pixel(
     inpainting["main"]()
     (mask,) = unknown
     assert filled and all(mask[hole].all() for hole in filled)
+
+
+def shipped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
+    """The module of the pattern-free crops, over two painted pictures instead of scikit-image's."""
+    monkeypatch.syspath_prepend(str(SCRIPTS[0].parent))
+    module = importlib.import_module("pattern_free")
+    random = np.random.default_rng(0)
+    for name in ("astronaut.png", "moon.png"):
+        cv2.imwrite(str(folder / name), random.integers(0, 255, (600, 700, 3), np.uint8))
+    monkeypatch.setattr(module, "PHOTOS", ("astronaut.png", "moon.png"))
+    monkeypatch.setattr(module, "folder", lambda: folder)
+    return module
+
+
+def test_pattern_free_crops_follow_from_the_seed_and_those_at_other_scales_are_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = shipped(tmp_path, monkeypatch)
+    for cut in (module.crops, module.scaled_crops):
+        first, again, other = (list(cut(4, seed)) for seed in (0, 0, 1))
+        assert [name for name, _ in first] == [name for name, _ in again] != [name for name, _ in other]
+        assert all(np.array_equal(a.pixels, b.pixels) for (_, a), (_, b) in zip(first, again, strict=True))
+    scales = [float(name.split(" x ")[1].split()[0]) for name, _ in module.scaled_crops(4)]
+    assert all(scale < 0.8 or scale > 1.3 for scale in scales) and min(scales) < 1 < max(scales)
+
+
+def test_no_pattern_free_crop_shows_the_flag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = shipped(tmp_path, monkeypatch)
+    photo = np.zeros((600, 700, 3), np.uint8)
+    photo[:, : module.FLAG_PX - 4] = 255
+    cv2.imwrite(str(tmp_path / "astronaut.png"), photo)
+    for cut in (module.crops, module.scaled_crops):
+        assert all(image.pixels.max() < 0.5 for name, image in cut(12) if name.startswith("astronaut"))
+
+
+def test_what_is_answered_of_pattern_free_crops_is_told_with_its_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = shipped(tmp_path, monkeypatch)
+    program = p3i.loads("Draw(x=0, y=0)")
+    answers = iter([None, program, None])
+
+    def found(_image: object, _config: object) -> SynthesisResult:
+        answer, bits = next(answers), 12.0
+        if answer is None:
+            return SynthesisResult(program=None, stop=StopReason.NO_PATTERN, bits=bits)
+        return SynthesisResult(
+            program=answer, stop=StopReason.FOUND, structure="circular", score=0.4, bits=80.0
+        )
+
+    monkeypatch.setattr(p3i, "synth", found)
+    module.searched("crops", module.crops(3), tmp_path / "out.jsonl")
+    told = capsys.readouterr().out
+    assert "2 of 3 refused (66.7%)" in told and "answered: 80" in told and "refused: 12" in told
+    assert len((tmp_path / "out.jsonl").read_text().splitlines()) == 3

@@ -66,7 +66,7 @@ def test_a_result_shows_its_facts_and_its_program() -> None:
 
 
 def test_a_result_without_a_program_says_why() -> None:
-    html = result_html(SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.02, needed=0.13))
+    html = result_html(SynthesisResult(program=None, stop=StopReason.NO_PATTERN, agreement=0.02, needed=0.13))
     assert html == "<p>no regular pattern (best 0.02, needs 0.13)</p>"
 
 

@@ -146,7 +146,7 @@ def score(
     progress: Progress | None = None,
     **options: Any,
 ) -> "Evaluation":
-    """How well `program` explains `photo`: equation 2 as printed in the paper, and the normalised score.
+    """How well `program` explains `photo`: equation 2 as printed in the paper, and how far its objects agree.
 
     Without a program it is the one that `synth` finds. `options` change `config` as in `synth`. Raises
     UsageError for options that cannot be, FileError or ParseError where photo or program cannot be read,
@@ -201,13 +201,15 @@ def eval_set(
     jobs: int = 1,
     only: str | None = None,
     limit: int | None = None,
+    fold: str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> "SetScore":
     """Measure the search on the annotated set in `folder` (docs/evaluation.md).
 
     `options` change `config` as in `synth`. With `results`, a file of the JSON lines that `synth` printed,
-    nothing is searched. `jobs` is the number of processes. Raises FileError and UsageError.
+    nothing is searched. `fold`, "1/2" or "2/2", takes one half of the set. `jobs` is the number of processes.
+    Raises FileError and UsageError.
     """
     asked = changed(config or SearchConfig(), options, verb="eval_set")
     from p3i.evaluation.score_set import score_set
@@ -219,6 +221,7 @@ def eval_set(
         jobs=jobs,
         only=only,
         limit=limit,
+        fold=fold,
         progress=progress,
     )
 

@@ -35,6 +35,9 @@ _GROUP = (
         "--results", type=click.Path(), metavar="FILE", help="Score these JSON lines; search nothing."
     ),
     click.option("--only", metavar="TEXT", help="Only photos whose name contains this."),
+    click.option(
+        "--fold", metavar="K/N", help="Part K of N of the set, 1/2 or 2/2: as many of each kind of photo."
+    ),
     click.option("--limit", type=int, metavar="N", help="Only the first N photos."),
 )
 @grouped.group(
@@ -61,6 +64,7 @@ def command(
     jobs: int,
     only: str | None,
     limit: int | None,
+    fold: str | None,
     quiet: bool,
     error_format: str,
     **given: Any,
@@ -76,7 +80,7 @@ def command(
         files.check_writable(Path(out), force=force)
     with progress.bar("eval", wanted=not quiet) as update:
         score = api.eval_set(
-            folder, config, results=results, jobs=jobs, only=only, limit=limit, progress=update
+            folder, config, results=results, jobs=jobs, only=only, limit=limit, fold=fold, progress=update
         )
     _print(score)
     if out is not None:
@@ -94,6 +98,8 @@ def _print(score: "api.SetScore") -> None:
         for row in score.rows
     ]
     wide.print(_table(("photo", "truth", *(title for _, title, _ in _PHOTO), ""), rows))
+    if score.fold is not None:
+        click.echo(f"fold {score.fold} of the set, {len(score.rows)} photos")
     groups = [(name, *_cells(means, _GROUP)) for name, means in score.summary.items()]
     wide.print(_table(("structure", *(title for _, title, _ in _GROUP)), groups))
     if score.wall is not None and score.cpu is not None:

@@ -40,9 +40,11 @@ SCORES = Kinds(
 def command(**given: Any) -> int:
     """Compare each PHOTO with itself at the neighbouring draws of the program PROG.
 
-    Prints equation 2 of the paper as printed there (the sum of squared feature differences over the
-    edges; less is better, but a smaller pattern has less too) and the normalised score (more is better),
-    by which `p3i synth` chooses. Without PROG the program is searched for.
+    Prints the agreement: the mean over the objects of how much better the others predict them than half
+    a step away, 0 to 1, more is better. It is evidence that the program is right, not how likely that is,
+    which the score of `p3i synth` says. And prints equation 2 of the paper as printed there: the sum of
+    squared feature differences over the edges; less is better, but a smaller pattern has less too.
+    Without PROG the program is searched for.
     """
     config = options.chosen(SearchConfig, given)
 
@@ -53,11 +55,11 @@ def command(**given: Any) -> int:
             "program": job.program_name,
             "equation2": found.equation2,
             "edges": found.edges,
-            "score": found.normalised,
+            "agreement": found.agreement,
             "features": config.features_used,
         }
         lines = (
-            f"score       {found.normalised:.4f}   normalised; more is better",
+            f"agreement   {found.agreement:.4f}   of the objects with each other; more is better",
             f"equation 2  {found.equation2:.6g}   over {found.edges} edges, as printed; less is better",
         )
         if job.one_of_many:

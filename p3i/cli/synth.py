@@ -76,8 +76,10 @@ def command(**given: Any) -> int:
 
     PHOTO is a file, a glob, a folder, @LIST (a text file of such names) or - (stdin).
 
-    Prints the program of a single photo on stdout. Exits with 5 where there is no regular pattern, and with 6
-    where only some of many photos have one. Ctrl-C prints the best program so far.
+    Prints the program of a single photo on stdout. Its `score` is how likely it is right: of answers that
+    say 0.9, nine in ten are (structure, lattice, and tilt within 2 degrees). Exits with 5 where there is
+    no regular pattern, and with 6 where only some of many photos have one. Ctrl-C prints the best program
+    so far.
     """
     return run(Call.of(given))
 
@@ -308,10 +310,8 @@ def _headed(call: Call, outcome: Outcome) -> list[str]:
     if len(texts) < 2 or result is None:
         return list(texts)
     if call.every:
-        kind, heads = (
-            "pattern",
-            [f"{one.structure}, score {one.score or 0.0:.4f}" for one in (result, *outcome.more)],
-        )
+        kind, told = "pattern", (result, *outcome.more)
+        heads = [f"{one.structure}, score {one.score or 0.0:.2f}" for one in told]
     else:
         kind, heads = "candidate", [candidate.title for candidate in result.candidates]
     return [

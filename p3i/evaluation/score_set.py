@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from p3i.errors import FileError, P3IError, UsageError
+from p3i.evaluation.folds import Fold
 from p3i.evaluation.measures import Measures, measure
 from p3i.evaluation.truth import STRUCTURES, Truth, read_truth
 from p3i.files import read_text
@@ -48,18 +49,23 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetScore:
-    """A set scored: rows in its order, means by structure, and its cost (None for answers made earlier)."""
+    """A set scored: rows in its order, means by structure, and its cost (None for answers made earlier).
+
+    `fold` says which part of the set was scored, as "1/2"; None for all of it.
+    """
 
     rows: tuple[Row, ...]
     summary: Mapping[str, Mapping[str, float | None]]
     wall: float | None = None
     cpu: float | None = None
     peak_mb: float | None = None
+    fold: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """All of it for a file."""
         rows = [row.as_json() for row in self.rows]
         return {
+            "fold": self.fold,
             "summary": self.summary,
             "rows": rows,
             "wall": self.wall,
@@ -76,23 +82,28 @@ def score_set(
     jobs: int = 1,
     only: str | None = None,
     limit: int | None = None,
+    fold: str | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> SetScore:
     """Score p3i with these options on a set, or, with `results`, a file of the JSON lines of `synth`.
 
-    `only` keeps the photos whose name contains it, `limit` so many of them. Photos without an answer count
+    `fold`, as "1/2", takes a fixed part of the set (evaluation/folds.py); `only` keeps those of its photos
+    whose name contains it, `limit` so many of them. Photos without an answer count
     with the worst measures. Raises FileError for a set or results that cannot be read, UsageError for counts
     out of range and where nothing is left to score.
     """
     if jobs < 1 or (limit is not None and limit < 1):
         raise UsageError("the number of jobs, and the limit, must be at least 1")
-    truths = [one for one in read_truth(folder) if only is None or only in one.file][:limit]
+    part = None if fold is None else Fold.parse(fold)
+    truths = read_truth(folder) if part is None else part.of(read_truth(folder))
+    truths = [one for one in truths if only is None or only in one.file][:limit]
     if not truths:
-        raise UsageError(f"no photo of {folder} has {only!r} in its name")
+        named = "" if only is None else f" has {only!r} in its name"
+        raise UsageError(f"no photo of {folder}{named}" + ("" if part is None else f" is in fold {part}"))
     if results is not None:
         answers = read_results(results)
         rows = [_row(truth, answers.get(Path(truth.file).name)) for truth in truths]
-        return SetScore(rows=tuple(rows), summary=summarise(rows))
+        return SetScore(rows=tuple(rows), summary=summarise(rows), fold=fold)
     begun = time.perf_counter()
     records, cpu, peak = [], 0.0, 0.0
     for place, (record, used, memory) in enumerate(_answers(folder, truths, config, jobs)):
@@ -102,7 +113,7 @@ def score_set(
             progress(f"{place + 1} of {len(truths)} photos", (place + 1) / len(truths))
     rows = [_row(truth, record) for truth, record in zip(truths, records, strict=True)]
     wall = time.perf_counter() - begun
-    return SetScore(rows=tuple(rows), summary=summarise(rows), wall=wall, cpu=cpu, peak_mb=peak)
+    return SetScore(rows=tuple(rows), summary=summarise(rows), wall=wall, cpu=cpu, peak_mb=peak, fold=fold)
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, dict[str, float | None]]:

@@ -66,7 +66,7 @@ def read_truth(folder: Path) -> tuple[Truth, ...]:
         name = entry.get("file") if isinstance(entry, dict) else None
         place = f"{path}, photo {number}" + (f" ({name})" if isinstance(name, str) else "")
         try:
-            found.append(_truth(entry))
+            found.append(truth_of(entry))
         except KeyError as error:
             raise FileError(f"{place}: {error.args[0]!r} is missing") from None
         except (AttributeError, IndexError, TypeError, ValueError) as error:
@@ -74,7 +74,8 @@ def read_truth(folder: Path) -> tuple[Truth, ...]:
     return tuple(found)
 
 
-def _truth(entry: Mapping[str, Any]) -> Truth:
+def truth_of(entry: Mapping[str, Any]) -> Truth:
+    """The truth of one entry of annotations.json. Raises KeyError, TypeError, ValueError for what is none."""
     structure, pose = entry["structure"], entry["pose"]
     if structure not in STRUCTURES:
         raise ValueError(f"a structure is one of {', '.join(STRUCTURES)}, not {structure!r}")

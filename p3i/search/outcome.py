@@ -6,6 +6,7 @@ from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.forms.asked import asks_for_itself, needed_for, stated_focal, why_not
 from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
+from p3i.search.judge.probability import Signs, probability
 from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
 from p3i.search.judge.table1 import unwritable_note, within_table1
@@ -43,20 +44,24 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         if look.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
         least, stop = look.evidence.least_period_px, look.stopped or reason
-        refused = told(config, assumed, None, stop, score=best, needed=needed, least_period_px=least)
+        bits = None if asked else max((answer.worth for answer in printed), default=None)
+        facts = {"agreement": best, "bits": bits, "needed": needed, "least_period_px": least}
+        refused = told(config, assumed, None, stop, **facts)
         look.record("answer", program=None, score=best, reason=refused.reason)
         return refused
     good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
     first = good[0]
     if not offers(first, config):
         stop = StopReason.NO_SUCH_OBJECT
-        refused = told(config, assumed, None, stop, score=first.score, readings=first.readings)
+        refused = told(config, assumed, None, stop, agreement=first.score, readings=first.readings)
         look.record("answer", program=None, score=first.score, reason=refused.reason)
         return refused
-    runner_up = max((answer.worth for answer in good[1:]), default=0.0)
-    margin = min(max((first.worth - runner_up) / max(abs(first.worth), 1.0), 0.0), 1.0)
+    elsewhere = other_readings(look, first, most=config.top - 1)
+    listed = [first, *elsewhere, *good[1:]][: config.top]
+    signs = [_signs(look, answer, good) for answer in listed]
+    margin_bits, sigma_deg = signs[0].margin_bits, signs[0].pose_sigma_deg
+    margin = min(max(margin_bits / max(abs(first.worth), 1.0), 0.0), 1.0)
     other = _mirrored(look, first)
-    sigma_deg = pose_sigma_deg(look.evidence, first)
     doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
     ambiguity = None if other is None else ambiguity_note(other)
     notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
@@ -69,7 +74,6 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     by_score = first.score >= needed
     if not by_score and config.extent_used == "found":
         notes = (*notes, faint_note(first, len(centers)))
-    elsewhere = other_readings(look, first, most=config.top - 1)
     look.tell("done", 1.0)
     look.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return told(
@@ -78,21 +82,26 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         first.program,
         look.stopped or StopReason.FOUND,
         structure=first.structure,
-        score=first.score,
+        score=probability(signs[0]),
+        agreement=first.score,
+        bits=None if asked else first.worth,
+        margin_bits=margin_bits,
         margin=margin,
         needed=needed if by_score else None,
         false_alarms=None if asked else false_alarms(first.worth),
         candidates=tuple(
             Candidate(
                 program=answer.program,
-                score=answer.score,
+                score=probability(told_by),
+                agreement=answer.score,
+                bits=None if asked else answer.worth,
                 structure=answer.structure,
                 false_alarms=None if asked else false_alarms(answer.worth),
                 reading=next((one for one in answer.readings if one.drawn), None),
                 same_lattice=answer in elsewhere,
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
-            for answer in [first, *elsewhere, *good[1:]][: config.top]
+            for answer, told_by in zip(listed, signs, strict=True)
         ),
         readings=first.readings,
         centers=centers,
@@ -104,6 +113,18 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         window=look.evidence.part.window,
         notes=notes,
         **_focal_facts(first, assumed),
+    )
+
+
+def _signs(look: Session, answer: Answer, good: list[Answer]) -> Signs:
+    """What one of the good answers is judged by when people are told how likely it is right."""
+    rivals = [other.worth for other in good if other is not answer]
+    return Signs(
+        structure=answer.structure,
+        bits=answer.worth,
+        agreement=answer.score,
+        margin_bits=answer.worth - max(rivals, default=0.0),
+        pose_sigma_deg=pose_sigma_deg(look.evidence, answer),
     )
 
 

@@ -12,7 +12,7 @@ from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
 
 NEEDED = 0.13
-"""The score that suffices for an answer (docs/benchmarks.md says what it was calibrated on)."""
+"""The agreement that suffices for an answer (docs/benchmarks.md says what it was calibrated on)."""
 
 StructureFound = Literal["lattice", "circular", "hybrid"]
 STRUCTURES: tuple[StructureFound, ...] = get_args(StructureFound)
@@ -83,15 +83,17 @@ _PHRASES: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """One program that the search weighed, with its normalised score (docs/search.md) and its own focal.
+    """One program that the search weighed, with its own focal; the rest as in SynthesisResult.
 
-    `false_alarms` as in SynthesisResult. `reading` is the place of the cell that a lattice's objects are on,
+    `reading` is the place of the cell that a lattice's objects are on,
     None for others. `same_lattice`: it is the answer's lattice, its objects on another place of the cell.
     """
 
     program: Program
     score: float
     structure: StructureFound
+    agreement: float | None = None
+    bits: float | None = None
     focal_mm: float = 35.0
     focal_source: FocalSource = "default"
     focal_reason: str = ""
@@ -116,6 +118,8 @@ class Candidate:
             "same_lattice": self.same_lattice,
             "focal": self.focal_mm,
             "score": _rounded(self.score),
+            "agreement": _rounded(self.agreement),
+            "bits": _rounded(self.bits, 1),
             "false_alarms": self.false_alarms,
         }
 
@@ -148,11 +152,15 @@ class Other:
 class SynthesisResult:
     """The answer for one photo.
 
-    `program` is None where nothing convinced; then `score` is the best that was seen, if any, and
-    `needed` what it should have reached. `needed` is None for an answer with a lower score (docs/search.md):
-    one that `false_alarms` convinced of, or that fills the picture. `false_alarms` is the number of finds as
-    good as this one that are expected in a picture of noise, None where it cannot be said: for rings, hybrids
-    and where there is no program. `margin` is the lead over the best candidate of another meaning.
+    `score` is how likely the answer is right: of answers that say 0.9, nine in ten are (docs/search.md).
+    `agreement` is how well the objects predict each other, 0 to 1, and `bits` what the program explains of
+    the photo less what it costs: both are evidence for the answer.
+    `program` is None where nothing convinced; then there is no score, `agreement` and `bits` are the best
+    that were seen, if any, and `needed` is the agreement that would have done. `needed` is None for an answer
+    of less agreement: one that `false_alarms` convinced of, or that fills the picture. `false_alarms` is the
+    number of finds as good as this one that are expected in a picture of noise, None where it cannot be said:
+    for rings, hybrids and where there is no program. `margin_bits` is the lead over the best candidate of
+    another meaning, and `margin` its share of the bits, 0 to 1.
     `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
     why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at
@@ -180,7 +188,10 @@ class SynthesisResult:
     stop: StopReason
     structure: StructureFound | None = None
     score: float | None = None
+    agreement: float | None = None
+    bits: float | None = None
     margin: float | None = None
+    margin_bits: float | None = None
     needed: float | None = None
     false_alarms: float | None = None
     candidates: tuple[Candidate, ...] = ()
@@ -207,10 +218,10 @@ class SynthesisResult:
         why = self.stop.value
         if (
             self.stop in (StopReason.NO_PATTERN, StopReason.NO_FIT)
-            and self.score is not None
+            and self.agreement is not None
             and self.needed is not None
         ):
-            why = f"{why} (best {self.score:.2f}, needs {self.needed:.2f})"
+            why = f"{why} (best {self.agreement:.2f}, needs {self.needed:.2f})"
         if self.stop is StopReason.NO_SUCH_OBJECT:
             return f"{why} (it offers {', '.join(reading.name for reading in self.readings)})"
         if self.least_period_px is None or self.program is not None:
@@ -258,7 +269,10 @@ class SynthesisResult:
             "centers": [[round(x, 2), round(y, 2), i, j] for x, y, i, j in self.centers],
             "region": [[round(x, 1), round(y, 1)] for x, y in self.region],
             "score": _rounded(self.score),
+            "agreement": _rounded(self.agreement),
+            "bits": _rounded(self.bits, 1),
             "margin": _rounded(self.margin),
+            "margin_bits": _rounded(self.margin_bits, 1),
             "false_alarms": self.false_alarms,
             "absent": self.absent,
             "seconds": None if seconds is None else round(seconds, 3),
@@ -282,5 +296,5 @@ def _object_facts(reading: Reading | None) -> dict[str, Any]:
     }
 
 
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 4)
+def _rounded(value: float | None, digits: int = 4) -> float | None:
+    return None if value is None else round(value, digits)

@@ -110,7 +110,7 @@ def test_a_photo_has_its_program_found_first(folder: Path, monkeypatch: pytest.M
 def test_a_photo_without_a_pattern_exits_with_5(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
-    nothing = SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.02, needed=0.13)
+    nothing = SynthesisResult(program=None, stop=StopReason.NO_PATTERN, agreement=0.02, needed=0.13)
     monkeypatch.setattr(search, "synth", lambda *_, **__: nothing)
     assert run(["points", "photo.png"]) == 5
     assert "no regular pattern" in capsys.readouterr().err

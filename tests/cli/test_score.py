@@ -25,7 +25,7 @@ for i in range(0, 3):
 class Evaluation:
     equation2: float
     edges: int
-    normalised: float
+    agreement: float
     objects: int = 9
 
 
@@ -36,7 +36,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[tuple]:
 
     def evaluate(image, program, config) -> Evaluation:
         calls.append((image.size, program, config))
-        return Evaluation(equation2=12.3456789, edges=12, normalised=0.654321)
+        return Evaluation(equation2=12.3456789, edges=12, agreement=0.654321)
 
     module = types.ModuleType("p3i.search.judge.evaluate")
     module.evaluate = evaluate  # type: ignore[attr-defined]
@@ -50,7 +50,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[tuple]:
 def test_both_measures_are_printed_with_their_sense(asked, capsys) -> None:
     assert run(["score", "a.png", "a.p3p"]) == 0
     assert capsys.readouterr().out == (
-        "score       0.6543   normalised; more is better\n"
+        "agreement   0.6543   of the objects with each other; more is better\n"
         "equation 2  12.3457   over 12 edges, as printed; less is better\n"
     )
 
@@ -62,7 +62,7 @@ def test_json_holds_the_numbers_in_full(asked, capsys) -> None:
         "program": "a.p3p",
         "equation2": 12.3456789,
         "edges": 12,
-        "score": 0.654321,
+        "agreement": 0.654321,
         "features": "oriented",
     }
 

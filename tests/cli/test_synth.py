@@ -60,7 +60,7 @@ class Search:
         if level == HAS_A_BUG:
             raise ZeroDivisionError("division by zero")
         if level == FINDS_NOTHING:
-            return SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.12, needed=0.35)
+            return SynthesisResult(program=None, stop=StopReason.NO_PATTERN, agreement=0.12, needed=0.35)
         self.meanwhile(image)
         stop = {IS_INTERRUPTED: StopReason.INTERRUPTED, IS_LATE: StopReason.TIME_UP}.get(level)
         if level == FINDS_A_RING:
@@ -137,7 +137,8 @@ def test_jsonl_has_the_documented_keys_in_order(photo, capsys) -> None:
     record = json.loads(capsys.readouterr().out)
     assert list(record) == [
         "image", "width", "height", "program", "structure", "object", "object_confidence", "camera",
-        "centers", "region", "score", "margin", "false_alarms", "absent", "seconds", "features", "seed",
+        "centers", "region", "score", "agreement", "bits", "margin", "margin_bits", "false_alarms",
+        "absent", "seconds", "features", "seed",
     ]  # fmt: skip
     assert (record["image"], record["width"], record["height"]) == ("a.png", 64, 48)
     assert record["camera"] == {
@@ -341,8 +342,8 @@ def test_the_progress_bar_stays_on_stderr_and_vanishes(photo) -> None:
 
 def test_top_prints_programs_one_after_another_each_under_its_score(photo, capsys) -> None:
     assert run(["synth", "--top", "2", photo("a.png")]) == 0
-    first, second = capsys.readouterr().out.split("# candidate 2 of 2: lattice, score 0.0600\n")
-    assert first.startswith("# candidate 1 of 2: lattice, score 0.1200\n# /// p3p\n")
+    first, second = capsys.readouterr().out.split("# candidate 2 of 2: lattice, score 0.06\n")
+    assert first.startswith("# candidate 1 of 2: lattice, score 0.12\n# /// p3p\n")
     assert p3i.loads(first).world == lattice(12.0).world
     assert p3i.loads(second).world == lattice(6.0).world
     assert run(["synth", "--top", "2", "a.png", "-o", "b.p3p"]) == 0

@@ -46,7 +46,7 @@ def test_a_board_of_three_hundred_faint_cells_is_answered_by_what_they_explain_t
     assert found.program is not None and found.stop is StopReason.FOUND, found.reason
     assert len(found.centers) > 0.8 * COLUMNS * ROWS
     assert abs(found.program.camera.rx_deg) < 2 and abs(found.program.camera.ry_deg) < 2
-    assert found.score is not None and found.score < NEEDED
+    assert found.agreement is not None and found.agreement < NEEDED
     assert found.false_alarms is not None and found.false_alarms < MOST_FALSE_ALARMS
     assert found.candidates[0].false_alarms == found.false_alarms
 
@@ -57,13 +57,13 @@ def test_nothing_says_that_such_an_answer_needs_a_score() -> None:
     assert any("together they explain" in note for note in found.notes)
 
 
-def test_its_score_is_the_one_that_score_says(tmp_path) -> None:
+def test_its_agreement_is_the_one_that_score_says(tmp_path) -> None:
     found = answer()
-    assert found.program is not None and found.score is not None
+    assert found.program is not None and found.agreement is not None
     text = tmp_path / "a.p3p"
     text.write_text(p3i.format(found.program))
-    said = p3i.score(board(stray_px=2.4, ruled=True), text).normalised
-    assert f"{found.score:.4f}" == f"{said:.4f}"
+    said = p3i.score(board(stray_px=2.4, ruled=True), text).agreement
+    assert f"{found.agreement:.4f}" == f"{said:.4f}"
 
 
 def test_stones_strewn_over_a_plain_ground_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""The score that `synth` prints is the one that `p3i score` says of the program it prints."""
+"""The agreement that `synth` tells is the one that `p3i score` says of the program it prints."""
 
 from functools import cache
 from pathlib import Path
@@ -68,17 +68,17 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_synth_prints_the_score_that_score_says(name: str, tmp_path: Path) -> None:
+def test_synth_tells_the_agreement_that_score_says(name: str, tmp_path: Path) -> None:
     image, config = picture(name)
     found: SynthesisResult = p3i.synth(image, config, top=2)
     assert found.program is not None and found.score is not None, found.reason
     for candidate in found.candidates:
         text = tmp_path / "a.p3p"
         text.write_text(p3i.format(candidate.program))
-        said = p3i.score(image, text).normalised
-        assert f"{candidate.score:.4f}" == f"{said:.4f}"
+        said = p3i.score(image, text).agreement
+        assert f"{candidate.agreement:.4f}" == f"{said:.4f}"
     header = found.program.header
     assert header is not None and dict(header.fit)["score"] == round(found.score, 4)
     assert found.score == found.candidates[0].score
     if config.extent == "found":
-        assert found.score >= NEEDED
+        assert found.agreement is not None and found.agreement >= NEEDED

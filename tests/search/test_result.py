@@ -8,12 +8,12 @@ from p3i.search.result import Candidate, Reading, StopReason, SynthesisResult
 PROGRAM = Program(CameraPose(), Draw(x=Affine(), y=Affine()))
 
 
-def test_a_refusal_names_the_best_score_and_the_one_that_is_needed() -> None:
-    result = SynthesisResult(program=None, stop=StopReason.NO_PATTERN, score=0.123, needed=0.35)
+def test_a_refusal_names_the_best_agreement_and_the_one_that_is_needed() -> None:
+    result = SynthesisResult(program=None, stop=StopReason.NO_PATTERN, agreement=0.123, needed=0.35)
     assert result.reason == "no regular pattern (best 0.12, needs 0.35)"
 
 
-def test_a_refusal_without_any_candidate_names_no_score() -> None:
+def test_a_refusal_without_any_candidate_names_no_agreement() -> None:
     assert SynthesisResult(program=None, stop=StopReason.NO_PATTERN).reason == "no regular pattern"
 
 

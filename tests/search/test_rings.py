@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from drawn import DrawnRing, noise_image, tilt_error_deg
+from p3i.search.extent.arc import as_far_as_it_goes
 from truth import small_scene
 
 from p3i.cli.main import run
@@ -16,7 +17,6 @@ from p3i.grammar.parser import parse
 from p3i.interp.unroll import nest, points
 from p3i.search import synthesize as synthesize_module
 from p3i.search.config import SearchConfig
-from p3i.search.extent.arc import as_far_as_it_goes
 from p3i.search.fit.places import measured
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import ring_filling
@@ -37,7 +37,7 @@ def session_on(ring: DrawnRing) -> Session:
 def test_auto_answers_a_ring_with_its_ring() -> None:
     result = synthesize(RING.image(), SearchConfig(focal_mm=35.0))
     assert result.stop is StopReason.FOUND and result.structure == "circular"
-    assert result.program is not None and result.score is not None and result.score >= NEEDED
+    assert result.program is not None and result.agreement is not None and result.agreement >= NEEDED
     assert len(points(result.program)) == RING.count
     assert tilt_error_deg(result.program, RING.rx_deg, RING.ry_deg) < 1
     found = np.array([(x, y) for x, y, _, _ in result.centers])

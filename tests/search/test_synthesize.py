@@ -58,8 +58,8 @@ def steps_away(scene: Scene, result: SynthesisResult) -> np.ndarray:
 def test_the_program_of_a_scene_is_found(seed: int) -> None:
     scene, result = small_scene(seed), answer(seed)
     assert result.stop is StopReason.FOUND and result.reason == ""
-    assert result.program is not None and result.score is not None
-    assert NEEDED <= result.score <= 1
+    assert result.program is not None and result.agreement is not None
+    assert NEEDED <= result.agreement <= 1
     assert pose_error_deg(result.program, scene.program) < 1
     found, truth = lattice_of(result.program), lattice_of(scene.program)
     assert lattice_error(found.basis, truth.basis) < 0.1
@@ -108,12 +108,13 @@ def photo(pixels: np.ndarray, valid: np.ndarray | None = None) -> Image:
 
 
 @pytest.mark.parametrize("pixels", [noise(), gradient()], ids=["noise", "gradient"])
-def test_what_has_no_pattern_is_refused_with_its_score(pixels: np.ndarray) -> None:
+def test_what_has_no_pattern_is_refused_with_its_evidence(pixels: np.ndarray) -> None:
     result = synthesize(photo(pixels), SearchConfig())
     assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
     assert result.centers == () and result.candidates == ()
-    assert result.score is not None and result.score < NEEDED == result.needed
-    assert result.reason == f"no regular pattern (best {result.score:.2f}, needs {NEEDED:.2f})"
+    assert result.agreement is not None and result.agreement < NEEDED == result.needed
+    assert result.score is None and result.margin_bits is None
+    assert result.reason == f"no regular pattern (best {result.agreement:.2f}, needs {NEEDED:.2f})"
 
 
 @pytest.mark.parametrize(
@@ -162,7 +163,7 @@ def test_an_interrupt_gives_the_best_so_far() -> None:
     scene = small_scene(MANY_TRIES)
     result = synthesize(scene.image(), SearchConfig(), progress=Interrupt("refining", turn=2))
     assert result.stop is StopReason.INTERRUPTED
-    assert result.program is not None and result.score is not None and result.score >= NEEDED
+    assert result.program is not None and result.agreement is not None and result.agreement >= NEEDED
     assert pose_error_deg(result.program, scene.program) < 1
 
 
@@ -213,7 +214,7 @@ def test_an_answer_whose_finished_program_scores_too_little_is_none(monkeypatch:
     answered_by(monkeypatch, "for j in range(0, 9):\n    Draw(x=9*Cos(40*j), y=9*Sin(40*j))\n")
     result = synthesize(photo(noise()), SearchConfig())
     assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
-    assert result.score is not None and result.score < NEEDED
+    assert result.agreement is not None and result.agreement < NEEDED
 
 
 @pytest.mark.parametrize(("radius", "told"), [(5, True), (24, False)])
@@ -275,12 +276,12 @@ def test_progress_tells_what_is_done_and_never_goes_back() -> None:
     # The trace: plain numbers and lists, a step of each kind.
     assert json.loads(json.dumps(steps)) == steps
     assert {step["step"] for step in steps} >= {"proposal", "fit", "answer"}
-    assert max(step["score"] for step in steps if step["step"] == "answer") == pytest.approx(result.score)
+    assert max(step["score"] for step in steps if step["step"] == "answer") == pytest.approx(result.agreement)
     # The candidates: distinct programs, the first of them the answer.
     texts = [format_program(candidate.program) for candidate in result.candidates]
     assert 1 <= len(texts) <= 3 and len(set(texts)) == len(texts)
     assert result.candidates[0].program == result.program and result.candidates[0].score == result.score
-    assert all(NEEDED <= candidate.score <= 1 for candidate in result.candidates)
+    assert all(NEEDED <= (candidate.agreement or 0) <= 1 for candidate in result.candidates)
     assert text_of(result) == text_of(answer(QUICK)), "asking for more candidates changes no answer"
 
 

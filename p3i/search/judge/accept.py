@@ -82,6 +82,6 @@ def convincing(found: Sequence[Answer], told: Sequence[Answer], *, needed: float
 def faint_note(answer: Answer, objects: int) -> str:
     """What to say of an answer whose score alone would not do."""
     return (
-        f"each of the {objects} objects agrees a little only (score {answer.score:.2f}); "
+        f"each of the {objects} objects agrees a little only (agreement {answer.score:.2f}); "
         f"together they explain {answer.worth:.0f} bits, which noise would hardly ever show"
     )

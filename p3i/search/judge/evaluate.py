@@ -1,8 +1,8 @@
-"""How well any program explains any photo: equation 2 as the paper prints it, and the normalised score.
+"""How well any program explains any photo: equation 2 as the paper prints it, and the agreement.
 
-The score is a function of photo and finished program (with the focal and the lens of its header) alone: what
-`synth` prints of its answers and what `p3i score` says. What each family knew besides while it searched only
-decides what it goes on with, and may refuse an answer that this score would let pass.
+The agreement is a function of photo and finished program (with the focal and the lens of its header) alone:
+what `synth` says of its answers and what `p3i score` says. What each family knew besides while it searched
+only decides what it goes on with, and may refuse an answer that this would let pass.
 """
 
 import re
@@ -33,15 +33,15 @@ class Evaluation:
     """A program on a photo.
 
     `equation2`: the paper's loss, the sum over `edges` neighbouring pairs of draws, both in sight, of the
-    squared difference of their features. `normalised`: the mean over the objects in sight of how much better
+    squared difference of their features. `agreement`: the mean over the objects in sight of how much better
     the others predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
-    perfect. `synth` prints the same for its answers, from the finished program. `objects`: how many are in
+    perfect. `synth` has the same for its answers, from the finished program. `objects`: how many are in
     sight.
     """
 
     equation2: float
     edges: int
-    normalised: float
+    agreement: float
     objects: int
 
 
@@ -118,7 +118,7 @@ def without_lens(evidence: Evidence, program: Program, k1: float | None) -> tupl
 
 
 def normalised_score(evidence: Evidence, pattern: Pattern, *, elsewhere: bool = True) -> float:
-    """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.normalised`.
+    """The mean contrast of the objects in sight, less a share for few objects: `Evaluation.agreement`.
 
     `pattern` draws no point twice. Cells are judged in the features that show most; curves and single rows at
     the place of their sector that shows most, or, if not `elsewhere`, where they are drawn.

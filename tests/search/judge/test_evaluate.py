@@ -35,13 +35,13 @@ def lattice(
 def test_the_true_program_scores_high_and_a_wrong_one_low() -> None:
     scene = small_scene(16)
     truth = evaluate(scene.image(), scene.program, CONFIG)
-    assert truth.normalised > 0.5
+    assert truth.agreement > 0.5
     assert truth.objects == len(scene.index)
     wrong_step = lattice((10.0, 1.3), (-0.8, 9.4), (-28.0, -18.0), pose=scene.program.camera)
-    assert evaluate(scene.image(), wrong_step, CONFIG).normalised < 0.1
+    assert evaluate(scene.image(), wrong_step, CONFIG).agreement < 0.1
     camera = scene.program.camera
     flat = replace(scene.program, camera=CameraPose(camera.rx_deg + 25, camera.ry_deg - 30))
-    assert evaluate(scene.image(), flat, CONFIG).normalised < 0.15
+    assert evaluate(scene.image(), flat, CONFIG).agreement < 0.15
 
 
 def test_a_score_is_of_the_objects_whatever_steps_they_are_written_in() -> None:
@@ -67,7 +67,7 @@ def test_a_score_is_of_the_objects_whatever_steps_they_are_written_in() -> None:
 def test_a_shifted_program_scores_as_high_but_one_at_twice_the_step_does_not() -> None:
     """What repeats repeats at any phase; but at a double step the half step is a period, too."""
     scene = small_scene(16)
-    truth = evaluate(scene.image(), scene.program, CONFIG).normalised
+    truth = evaluate(scene.image(), scene.program, CONFIG).agreement
     world = scene.program.world
     assert isinstance(world, For) and isinstance(world.body, For) and isinstance(world.body.body, Draw)
     draw = world.body.body
@@ -82,7 +82,7 @@ def test_a_shifted_program_scores_as_high_but_one_at_twice_the_step_does_not() -
         Affine(2 * draw.y.i, draw.y.j, draw.y.constant),
         i_stop=4,
     )
-    assert evaluate(scene.image(), double, CONFIG).normalised < 0.2 * truth
+    assert evaluate(scene.image(), double, CONFIG).agreement < 0.2 * truth
 
 
 def bilinear(values: np.ndarray, x: float, y: float) -> np.ndarray:
@@ -120,7 +120,7 @@ def test_equation_2_is_the_naive_sum_over_neighbours_in_sight(features: str) -> 
 
 def test_the_score_of_two_kinds_of_columns_does_not_depend_on_their_number() -> None:
     few, many, odd = (
-        evaluate(*two_kinds_of_columns(rows, columns), CONFIG).normalised
+        evaluate(*two_kinds_of_columns(rows, columns), CONFIG).agreement
         for rows, columns in ((24, 24), (30, 30), (27, 31))
     )
     assert many == pytest.approx(few, abs=0.03) and odd == pytest.approx(few, abs=0.03)
@@ -161,7 +161,7 @@ def test_a_row_is_scored_along_its_one_loop() -> None:
     )
     found = evaluate(scene.image(), program, CONFIG)
     assert found.edges == found.objects - 1
-    assert 0 <= found.normalised <= 1
+    assert 0 <= found.agreement <= 1
 
 
 @pytest.mark.parametrize("base", [(4000.0, 0.0), (0.0, -3000.0)])
@@ -193,7 +193,7 @@ def test_the_focal_is_that_of_the_option_then_the_header_then_the_photo() -> Non
     exif = Image(image.pixels, image.valid, focal_mm=80.0)
     right = evaluate(image, bare, CONFIG)
     assert right == evaluate(exif, told, CONFIG) == evaluate(exif, bare, SearchConfig(focal_mm=35.0))
-    assert evaluate(exif, bare, CONFIG).normalised < right.normalised - 0.1
+    assert evaluate(exif, bare, CONFIG).agreement < right.agreement - 0.1
     assert evaluate(exif, bare, CONFIG) == evaluate(image, told, SearchConfig(focal_mm=80.0))
 
 
@@ -207,7 +207,7 @@ def test_a_mask_takes_objects_out_of_the_loss() -> None:
     other = image.pixels.copy()
     other[~valid] = np.random.default_rng(0).uniform(size=(int((~valid).sum()), 3))
     again = evaluate(Image(other, valid), scene.program, CONFIG)
-    assert again.normalised == pytest.approx(half.normalised, abs=0.02)
+    assert again.agreement == pytest.approx(half.agreement, abs=0.02)
 
 
 def test_few_objects_get_less_than_many() -> None:
