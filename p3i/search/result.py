@@ -79,9 +79,9 @@ class SynthesisResult:
 
     `program` is None where nothing convinced; then `score` is the best that was seen, if any, and
     `needed` what it should have reached. `needed` is None for an answer with a lower score (docs/search.md):
-    one that `false_alarms` convinced of, or that fills the picture. `false_alarms` is the number of finds as
-    good as this one that are expected in a picture of noise, None where it cannot be said: for rings, hybrids
-    and where there is no program. `margin` is the lead over the best candidate of another meaning.
+    one that `false_alarms` convinced of. `false_alarms` is the number of finds as good as this one that are
+    expected in a picture without a pattern, None where a person asked for it and where there is no program.
+    `margin` is the lead over the best candidate of another meaning.
     `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
     why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at
