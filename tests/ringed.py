@@ -22,7 +22,7 @@ def session_with_ring(
     start = measured(evidence, filling, numbers_of(filling, off), focal_mm=35.0)
     assert start is not None
     fit = follow(evidence, start, rounds=4)
-    session.rings = (FoundRing(fit, curve_score(fit)),)
+    session.rings = (FoundRing(fit, curve_score(fit), 100.0),)
     return session
 
 
