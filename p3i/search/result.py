@@ -158,8 +158,8 @@ class SynthesisResult:
     `program` is None where nothing convinced; then there is no score, `agreement` and `bits` are the best
     that were seen, if any, and `needed` is the agreement that would have done. `needed` is None for an answer
     of less agreement: one that `false_alarms` convinced of, or that fills the picture. `false_alarms` is the
-    number of finds as good as this one that are expected in a picture of noise, None where it cannot be said:
-    for rings, hybrids and where there is no program. `margin_bits` is the lead over the best candidate of
+    number of finds as good as this one that are expected in a picture without a pattern, None where a person
+    asked for it and where there is no program. `margin_bits` is the lead over the best candidate of
     another meaning, and `margin` its share of the bits, 0 to 1.
     `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says

@@ -32,6 +32,8 @@ _REACH = 1.55
 _LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
+# Kinds whose means differ by less than this share of what varies along the ring are one.
+_UNTOLD = 0.03
 # The object's middle lies this close to the radius where most repeats, in sector sides.
 _NEAR = 0.17
 
@@ -118,7 +120,8 @@ def _within_one_kind(sectors: Sectors, rows: slice) -> Mask:
             np.roll(table, _SIDE // 2 - column, 0).reshape(-1, _SIDE, 3).sum(1) for table in sums
         )
         spread[column] = (colour / np.maximum(count, 1)).var(0).sum()
-    lost = 0.5 * (lab.shape[1] // _SIDE - 1) * np.log2(spread.max() / np.maximum(spread, 1e-9))
+    spread += _UNTOLD * float(np.where(known, lab - lab.mean(1, keepdims=True), 0).var((0, 1)).sum()) + 1e-9
+    lost = 0.5 * (lab.shape[1] // _SIDE - 1) * np.log2(spread.max() / spread)
     return lost <= -math.log2(MOST_FALSE_ALARMS)
 
 
@@ -144,16 +147,24 @@ def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tupl
     weights = ring.weights.clip(0)  # where none is sure, all are asked
     sure = np.flatnonzero(weights >= 0.5 * weights.max())
     median, _ = median_cell(np.asarray(colours, np.float32), sectors.cut(sectors.known, rows), sure)
-    median = median - np.median(median, 2, keepdims=True)  # what is alike at every turn, a rim, is no object
+    down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
+    allowed = (np.abs(down) < _NEAR)[:, None] & _within_one_kind(sectors, rows)
+    # What is alike at every turn, a rim, is no object: without it objects and gaps are told apart. With it
+    # the middle of what was told is found.
+    without_rim = median - np.median(median, 2, keepdims=True)
+    column = int(np.where(allowed, _worth(template, without_rim), -np.inf).max(0).argmax())
+    apart = np.abs((np.arange(_SIDE) - column + _SIDE // 2) % _SIDE - _SIDE // 2)
+    worth = np.where(allowed & (apart < _SIDE // 4), _worth(template, median), -np.inf)
+    y, x = divmod(int(np.argmax(worth)), _SIDE)
+    return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)
+
+
+def _worth(template: Floats, median: Floats) -> Array:
+    """How much speaks for a middle at each sample of a sector: gradients and colours [C, n, n] -> [n, n]."""
     cues = {
         "symmetry": symmetry(template),
         "contrast": contrast(median),
         "parts": parts(median),
         "texture": concentration((template**2).sum(0)),
     }
-    worth = sum(WEIGHTS[name] * cue for name, cue in cues.items())
-    down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
-    allowed = (np.abs(down) < _NEAR)[:, None] & _within_one_kind(sectors, rows)
-    worth = np.where(allowed, worth, -np.inf)
-    y, x = divmod(int(np.argmax(worth)), _SIDE)
-    return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)
+    return np.asarray(sum(WEIGHTS[name] * cue for name, cue in cues.items()))

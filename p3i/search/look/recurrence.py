@@ -102,7 +102,7 @@ def _bits(waves: NDArray[np.complex64]) -> float:
     best = 0.0
     for last in range(1, len(shared) + 1):
         total = samples[:last].sum()
-        share = float((shared[:last] * samples[:last]).sum() / total) * (1 - _UNTOLD)
+        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - _UNTOLD)
         if share > 1 / number:
             best = max(best, float(total) * likelihood_ratio(share, number))
     # One of so many choices was made.

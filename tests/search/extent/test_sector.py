@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from drawn import DrawnRing
 
+from p3i.interp.camera import Camera
 from p3i.search.config import SearchConfig
 from p3i.search.extent.sector import Place, Ring, places
 from p3i.search.look.evidence import Evidence
+from p3i.size import Size
+from p3i.vision.image import Image
 
 DRAWN = DrawnRing()
 
@@ -64,3 +67,33 @@ def test_objects_that_are_not_there_do_not_mislead_where_they_weigh_nothing() ->
 def test_objects_of_which_none_is_sure_still_have_a_place() -> None:
     place = told(radius=26.0, turn_deg=5.0, weights=np.linspace(-0.3, -0.1, DRAWN.count))
     assert abs(place.radius - DRAWN.radius) < 0.5 * DRAWN.size
+
+
+def painted(grey: np.ndarray) -> Evidence:
+    shown = np.ascontiguousarray(np.repeat(np.clip(grey, 0, 1)[..., None], 3, 2), np.float32)
+    return Evidence(Image(shown, np.ones(grey.shape, bool)), SearchConfig(), 35.0)
+
+
+def polar(side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The radius in pixels and the angle in degrees of each pixel about the middle."""
+    y, x = np.mgrid[0:side, 0:side] - (side - 1) / 2
+    return np.hypot(x, y), np.degrees(np.arctan2(y, x)) % 360
+
+
+def straight_on(*, first_deg: float, count: int, radius: float, side: int) -> Ring:
+    seen = Camera(0, 0, 35.0).image_from_plane(Size(side, side)).numpy()
+    index = np.arange(count, dtype=float)
+    return Ring(np.zeros(2), radius, first_deg, 360 / count, index, np.ones(count), seen)
+
+
+@pytest.mark.parametrize("first_deg", [0.0, 4.0, 9.0])
+def test_fields_of_two_kinds_are_the_objects_not_the_borders_between_them(first_deg: float) -> None:
+    side, count = 300, 20
+    radius, angle = polar(side)
+    field = (angle // (360 / count)) % 2
+    grey = np.where((radius > 80) & (radius < 110), 0.2 + 0.6 * field, 0.5)
+    border = np.abs((angle + 9) % 18 - 9) * np.pi / 180 * radius < 1.2
+    grey = np.where(border & (radius < 112), 1.0, grey)
+    ring = straight_on(first_deg=first_deg, count=count, radius=95 / side * 100, side=side)
+    place = places(painted(grey), ring)[0]
+    assert abs((first_deg + place.turn_deg) % 18 - 9) < 2.5
