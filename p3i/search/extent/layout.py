@@ -14,7 +14,7 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.search.extent.outline import Outline
 from p3i.search.extent.phase import Phase, find_phases
-from p3i.search.extent.presence import find_extent
+from p3i.search.extent.presence import FEWEST_MISSES, find_extent
 from p3i.search.fit.grow import Fit, sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
 from p3i.search.fit.robust import fit_instances
@@ -36,10 +36,8 @@ _MOST_REFITTED = 300
 _FEWEST_REFITTED = 6
 _REFITS = 3
 # A place of the cell of at least this share of the likeliest's probability is a rival. Where both have an
-# object in each cell but for so few, every further object doubles the odds, up to so many times.
+# object in each cell but for the fewest that any pattern lacks, every further object doubles the odds.
 _RIVAL = 0.05
-_FEW_MISSES = 0.04
-_MOST_BITS = 50.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +131,8 @@ def _weighed(
         for k in rivals:
             outlines[k] = outline(phases[k])
     more = [one.there - first.there if first and one and _whole(one) else 0.0 for one in outlines]
-    odds = np.array([phase.probability for phase in phases]) * 2.0 ** np.clip(more, -_MOST_BITS, _MOST_BITS)
+    bits = np.log2([max(phase.probability, 1e-12) for phase in phases]) + more
+    odds = 2.0 ** (bits - bits.max())
     odds /= odds.sum()
     order = np.argsort(-odds, kind="stable")
     return [replace(phases[k], probability=float(odds[k])) for k in order], [outlines[k] for k in order]
@@ -141,7 +140,7 @@ def _weighed(
 
 def _whole(outline: Outline) -> bool:
     """Whether next to all cells of an outline hold an object."""
-    return outline.there > (1 - _FEW_MISSES) * outline.seen
+    return outline.there > (1 - FEWEST_MISSES) * outline.seen
 
 
 def layout_at(

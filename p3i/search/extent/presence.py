@@ -24,7 +24,9 @@ Mask = NDArray[np.bool_]
 
 _SLACK = 0.09  # of a period: how far an object may lie from its place
 _FAILS, _PASSES = 0.3, 0.7  # of the scaled agreement: below no object, above surely one
-_MISSES = (0.04, 0.1, 0.2, 0.35, 0.5)  # shares of objects that do not look like the others
+FEWEST_MISSES = 0.04
+"""Share of a pattern's objects that do not look like the others, at the least."""
+_MISSES = (FEWEST_MISSES, 0.1, 0.2, 0.35, 0.5)  # such shares that are thought of
 _STRAYS = (0.02, 0.06, 0.15)  # shares of other things that do
 _LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _SMALLEST_PX = 4.5  # a cell that shows smaller than this is not judged
