@@ -27,16 +27,14 @@ Mask = NDArray[np.bool_]
 TOWARDS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """The neighbours (i, j) towards which the halves of a cell lie, in the order of `CellBits.halves`."""
 MISSES = (0.04, 0.1, 0.2, 0.35, 0.5)
-"""Shares of objects that do not look like the others."""
+"""Shares of objects that do not look like the others, from the least that a pattern has."""
 STRAYS = (0.02, 0.06, 0.15)
 """Shares of other things that do."""
 
 _SLACK = 0.09  # of a period: how far an object may lie from its place
 _UNLIKE, _LIKE = 0.3, 0.7  # of the scaled agreement: below no object, above surely one
-_HALF_UNLIKE, _HALF_LIKE = (
-    0.5,
-    1.0,
-)  # the same of a half, which a line along the rim alone agrees with by half
+# The same of a half, which a line along the rim alone agrees with by half.
+_HALF_UNLIKE, _HALF_LIKE = 0.5, 1.0
 _LEAST_VISIBLE = 0.25  # of a cell, for it to be judged
 _LEAST_LEAD = 0.05  # of a typical cell's agreement over that of others; below it nothing tells them apart
 _ROUNDS = 6  # so often the mean of the neighbours is taken anew

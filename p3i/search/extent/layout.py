@@ -29,6 +29,7 @@ from p3i.search.look.contrast import score_of
 from p3i.search.look.edges import edge_directions
 from p3i.search.look.evidence import Evidence
 from p3i.search.result import Reading
+from p3i.vision.cell_bits import MISSES
 from p3i.vision.warp import in_frame
 
 # Fewer objects are not fitted once more.
@@ -36,10 +37,8 @@ _FEWEST_REFITTED = 6
 # A proposal is shown so many steps to each side.
 _SHOWN = (-6, 7)
 # A place of the cell of at least this share of the likeliest's probability is a rival. Where both have an
-# object in each cell but for so few, every further object doubles the odds, up to so many times.
+# object in each cell but for the fewest that any pattern lacks, every further object doubles the odds.
 _RIVAL = 0.05
-_FEW_MISSES = 0.04
-_MOST_BITS = 50.0
 
 
 def proposed(guess: Guess) -> Program:
@@ -113,7 +112,8 @@ def _weighed(phases: Sequence[Phase], outline: Callable[[Phase], Outline | None]
         for k in rivals:
             outlines[k] = outline(phases[k])
     more = [one.there - first.there if first and one and _whole(one) else 0.0 for one in outlines]
-    odds = np.array([phase.probability for phase in phases]) * 2.0 ** np.clip(more, -_MOST_BITS, _MOST_BITS)
+    bits = np.log2([max(phase.probability, 1e-12) for phase in phases]) + more
+    odds = 2.0 ** (bits - bits.max())
     odds /= odds.sum()
     order = np.argsort(-odds, kind="stable")
     return [replace(phases[k], probability=float(odds[k])) for k in order]
@@ -121,7 +121,7 @@ def _weighed(phases: Sequence[Phase], outline: Callable[[Phase], Outline | None]
 
 def _whole(outline: Outline) -> bool:
     """Whether next to all cells of an outline hold an object."""
-    return outline.there > (1 - _FEW_MISSES) * outline.seen
+    return outline.there > (1 - MISSES[0]) * outline.seen
 
 
 def layout_at(
