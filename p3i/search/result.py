@@ -85,7 +85,8 @@ _PHRASES: Mapping[str, str] = {
 class Candidate:
     """One program that the search weighed, with its own focal; the rest as in SynthesisResult.
 
-    `reading` is the place of the cell that a lattice's objects are on, None for others. `same_lattice`: it is the answer's lattice, its objects on another place of the cell.
+    `reading` is the place of the cell that a lattice's objects are on, None for others. `same_lattice`: it is
+    the answer's lattice, its objects on another place of the cell.
     """
 
     program: Program
