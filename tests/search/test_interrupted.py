@@ -249,7 +249,7 @@ def test_an_interrupt_while_sketches_are_walked_keeps_what_these_found(
 def test_an_interrupt_while_the_lens_is_estimated_keeps_what_the_photo_showed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(lens_module, "estimated", Once(1))
+    monkeypatch.setattr(lens_module, "lens_told", Once(1))
     scene = small_scene(14)
     result = synthesize(scene.image(), SearchConfig(lens="auto"))
     assert result.stop is StopReason.INTERRUPTED

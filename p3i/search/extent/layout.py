@@ -20,7 +20,7 @@ from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.look.cells import sample_points
 from p3i.search.look.contrast import score_of
-from p3i.search.look.evidence import Evidence, Level
+from p3i.search.look.evidence import Evidence
 from p3i.vision.warp import in_frame
 
 # Fewer objects are not fitted once more.
@@ -142,14 +142,6 @@ def layout_fit(evidence: Evidence, layout: Layout) -> Fit | None:
     return weighed(best.level, drawn, drawn.theta, best.index, best.contrast)
 
 
-def _drawn_cells(
-    level: Level, pattern: Pattern, layout: Layout, theta: Tensor, *, cut: bool | None = None
-) -> Tensor:
-    """The cells in view that a layout draws, [N, 2]; `cut` as in `cells_in_view`."""
-    index = cells_in_view(level, pattern, theta, most=4000, cut=cut)
-    return index[torch.from_numpy(layout.holds(index.numpy()))]
-
-
 def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     """The layout with camera and lattice fitted once more, to where its own objects lie.
 
@@ -163,12 +155,6 @@ def refitted(evidence: Evidence, pattern: Pattern, layout: Layout) -> Layout:
     drawn = compile(program)
     theta = Lattice.of(drawn, drawn.theta).theta(pattern)
     return replace(layout, lattice=Lattice.of(pattern, theta)) if sane(pattern, theta) else layout
-
-
-def side_of_middle(evidence: Evidence, pattern: Pattern, layout: Layout) -> float:
-    """The side, in photo pixels, of the cell in the middle of a layout."""
-    middle = np.array([sum(layout.i_range) - 1, sum(layout.j_range) - 1]) / 2
-    return side_of_cell(evidence, pattern, layout.lattice.moved_to(middle).theta(pattern))
 
 
 def _painted(evidence: Evidence, cells: Tensor, matrix: np.ndarray, lattice: Lattice) -> np.ndarray:
