@@ -74,7 +74,7 @@ def test_features_may_be_joined() -> None:
         ({"recipe": "paper", "structure": "hybrid"}, "--structure hybrid contradict"),
         ({"sketch": SKETCH, "focal_mm": "auto"}, "--sketch is fitted under one focal"),
         ({"start": SKETCH.template, "focal_mm": "auto"}, "--start is fitted under one focal"),
-        ({"sketch": SKETCH, "lens": "auto"}, "leave out --lens"),
+        ({"sketch": SKETCH, "lens": 0.1}, "leave out --lens"),
         ({"start": SKETCH.template, "lens": -0.1}, "leave out --lens"),
         ({"exhaustive_s": 3.0, "strict": True}, "leave out --strict"),
         ({"structure": "circular", "extent": "image"}, "continues lattices only"),

@@ -232,7 +232,7 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer(
 def test_an_interrupt_while_the_lens_is_estimated_keeps_what_the_photo_showed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(lens_module, "estimated", Once(1))
+    monkeypatch.setattr(lens_module, "lens_told", Once(1))
     scene = small_scene(14)
     result = synthesize(scene.image(), SearchConfig(lens="auto"))
     assert result.stop is StopReason.INTERRUPTED

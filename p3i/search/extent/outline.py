@@ -43,7 +43,7 @@ _IDLE = 1e-3  # bits that a cell costs, so that outlines do not reach out for no
 class Outline:
     """Half-open ranges of i and j, guards (a, b, c) for `a*i + b*j >= c`, and the gain in bits.
 
-    `seen` is how many of its cells can be judged, and `there` how many of these speak for an object.
+    `seen` is how many of its cells can be judged, and `there` how many of these hold an entire object.
     """
 
     i_range: tuple[int, int]
@@ -67,11 +67,13 @@ class Outline:
 class Cells:
     """What is known of a lattice's cells: `bits` [R, C] that speak for an object, of (i, j) from `first` on.
 
-    `judged` [R, C]: which of the cells the photo shows well enough.
+    `judged` [R, C]: which of the cells the photo shows well enough; `entire`: of which of them each half
+    speaks for an object as well.
     """
 
     bits: Array
     judged: NDArray[np.bool_]
+    entire: NDArray[np.bool_]
     first: tuple[int, int]
 
     def changed(self, change: NDArray[np.int64]) -> "Cells | None":
@@ -86,10 +88,15 @@ class Cells:
         low, high = index.min(0), index.max(0) + 1
         if (high - low).prod() > _MOST_CELLS:
             return None
-        bits, judged = np.zeros((high - low)[::-1]), np.zeros((high - low)[::-1], bool)
         at = tuple((index - low).T[::-1])
-        bits[at], judged[at] = self.bits[j, i], self.judged[j, i]
-        return Cells(bits, judged, (int(low[0]), int(low[1])))
+
+        def moved(table: NDArray) -> NDArray:
+            found = np.zeros((high - low)[::-1], table.dtype)
+            found[at] = table[j, i]
+            return found
+
+        tables = [moved(table) for table in (self.bits, self.judged, self.entire)]
+        return Cells(*tables, (int(low[0]), int(low[1])))
 
     def outline(self) -> Outline | None:
         """What of the cells is drawn; None where nothing speaks for any."""
@@ -97,7 +104,7 @@ class Cells:
         if found is None:
             return None
         seen = self._held(found) & self.judged
-        return replace(found, there=int((self.bits[seen] > 0).sum()), seen=int(seen.sum()))
+        return replace(found, there=int(self.entire[seen].sum()), seen=int(seen.sum()))
 
     def unseen(self, outline: Outline) -> int:
         """How many cells an outline holds of which nothing is known."""
@@ -118,12 +125,12 @@ class Cells:
 
 
 def best_outline(
-    evidence: Array, *, halves: Array | None = None, i_start: int = 0, j_start: int = 0
+    evidence: Array, *, halves: Array | None = None, parts: bool = True, i_start: int = 0, j_start: int = 0
 ) -> Outline | None:
     """The outline of the greatest gain over `evidence` [R, C]; None where no cell has evidence for it.
 
     `halves` [4, R, C] is the evidence of half of each cell: the half towards greater i, smaller i, greater j
-    and smaller j.
+    and smaller j. `parts`: what lies beyond an empty line is another pattern.
     """
     if not (evidence > 0).any():
         return None
@@ -143,7 +150,7 @@ def best_outline(
     found += [_improved(worth, i, j, _bounds(evidence > 0), guards) for guards in _diamonds(worth, i, j)]
     best = max(found, key=lambda outline: outline.gain)
     best = _without_idle_guards(worth, i, j, best)
-    best = _without_empty_lines(worth, i, j, best)
+    best = _without_empty_lines(worth, i, j, best) if parts else best
     inside = best.holds(i, j)
     if inside.any():
         i0, i1, j0, j1 = _bounds(inside)

@@ -57,18 +57,25 @@ def cells_that_hold(
         outside = _outside(cells_from_basis(matrix, basis, origin), box, roi, roi.shape[1] / mask.shape[1])
         nothing = min(float(bits.min()), -GUARD_BITS)
         bits, halves = (np.where(outside.reshape(grid), nothing, one) for one in (bits, halves))
-    return Cells(_with_rims(bits, halves), found.judged.reshape(grid), (box.i_start, box.j_start))
+    return _one_pattern(bits, halves, found.judged.reshape(grid), first=(box.i_start, box.j_start))
 
 
-def _with_rims(bits: Array, halves: Array) -> Array:
-    """The bits [R, C] of cells, those along a rim by their halves [4, R, C] towards the pattern."""
+def _one_pattern(bits: Array, halves: Array, judged: Mask, *, first: tuple[int, int]) -> Cells:
+    """The cells [R, C] of the pattern with most bits, whatever steps its program will take.
+
+    Along a rim the `halves` [4, R, C] towards the pattern speak, so that these cells are judged by no whole
+    one; and beyond an empty row or column is another pattern, of which nothing is drawn.
+    """
     rows, columns = bits.shape
     i, j = np.meshgrid(np.arange(columns), np.arange(rows))
-    outlines = best_outline(bits), best_outline(bits, halves=halves)
+    outlines = best_outline(bits, parts=False), best_outline(bits, halves=halves)
+    entire = judged & (bits > 0) & (halves > 0).all(0)
     if outlines[0] is None or outlines[1] is None:
-        return bits
-    inside, wider = (outline.holds(i, j) for outline in outlines if outline is not None)
-    return np.where(wider & ~inside, np.maximum(bits, halves.max(0)), bits)
+        return Cells(bits, judged, entire, first)
+    before, after = (outline.holds(i, j) for outline in outlines if outline is not None)
+    rim, beyond = after & ~before, before & ~after & (bits > 0)
+    told = np.where(rim, np.maximum(bits, halves.max(0)), np.where(beyond, -GUARD_BITS, bits))
+    return Cells(told, judged & ~rim, entire & ~rim, first)
 
 
 def _outside(image_from_cells: Array, box: Box, roi: Mask, scale: float) -> Mask:

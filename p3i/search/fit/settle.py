@@ -17,7 +17,7 @@ Places are pixels of the photo as it was taken.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -32,7 +32,7 @@ from p3i.search.fit.slopes import with_slopes
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.whole import whole_filling
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import find_objects, frames, half_steps, spacing, whitening
+from p3i.search.look.patches import find_about, find_objects, frames, half_steps, spacing, whitening
 from p3i.search.look.straight import Straightened, shifted
 from p3i.search.look.thinned import thinned
 from p3i.size import Size
@@ -42,6 +42,8 @@ Free = Literal["focal", "lens", "bend"]
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 150
 _FEWEST = 2
+# Each is looked for twice, the second time in so many samples along a side, by so many to each side.
+_CLOSER_SIDE, _CLOSER_REACH = 24, 8
 # Degrees of freedom of the noise. Of its scale it says (4 + 2) / (4 + 4) of what a Gaussian would.
 _TAIL = 4.0
 # The scale of residuals, in units of `whitening`: where to begin, and the least that is believed.
@@ -207,8 +209,15 @@ def objects_of(
         return None
     where = frames(pattern, theta, index[there], side=side)
     matrix = pattern.image_from_plane(theta, size=canvas, focal_mm=focal_mm)
-    places, _ = project(matrix, where.points(found.offsets[there][:, None])[:, 0])
-    certainty = found.certainty[there].double()
+    certainty = found.certainty[there]
+    # Once more where they were found, in finer samples.
+    about = replace(where, origin=where.points(found.offsets[there][:, None])[:, 0])
+    closer = find_about(
+        evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE, reach=_CLOSER_REACH
+    )
+    offsets = torch.where((closer.lead > 0)[:, None], closer.offsets, 0.0)
+    places, _ = project(matrix, about.points(offsets[:, None])[:, 0])
+    certainty = certainty.double()
     return Objects(
         filling,
         numbers,

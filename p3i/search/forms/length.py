@@ -7,6 +7,8 @@ from p3i.interp.unroll import nest
 NUMBER_BITS = 7.0
 """A length or an angle: on the largest map, of 640 pixels, so many places lie 5 pixels apart, a quarter of
 the step of what can be seen."""
+CAMERA_BITS = 13.0
+"""A lens or a focal of the pattern's own, as a header writes them: four digits."""
 WHOLE_BITS = 5.0
 """A bound, or a number of a guard."""
 PRODUCTION_BITS = 2.0

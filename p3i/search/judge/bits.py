@@ -22,7 +22,7 @@ from p3i.interp.pattern import without_doubles
 from p3i.search.answer import Answer
 from p3i.search.fit.judged import sweeps_cells
 from p3i.search.forms.lattice import in_shortest_steps
-from p3i.search.forms.length import NUMBER_BITS, cost_bits
+from p3i.search.forms.length import CAMERA_BITS, cost_bits
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import MOST_FALSE_ALARMS, recurrence_bits
@@ -82,5 +82,5 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
 
 
 def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:
-    """What so many numbers are worth that save these bits: less their cost and what noise might save."""
-    return saved - numbers * NUMBER_BITS + math.log2(MOST_FALSE_ALARMS)
+    """What so many numbers of a camera are worth that save these bits: less their cost and noise's share."""
+    return saved - numbers * CAMERA_BITS + math.log2(MOST_FALSE_ALARMS)

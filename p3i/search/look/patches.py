@@ -210,15 +210,32 @@ def find_objects(
     """
     where = frames(pattern, theta, index, side=side)
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    colours = evidence.colours_for(sample_px(matrix, where))
-    patches = read(colours, matrix, where, count=SIDE + 2 * reach)
+    return find_about(evidence, matrix, where, index, weights, reach=reach)
+
+
+def find_about(
+    evidence: Evidence,
+    matrix: Tensor,
+    where: Frames,
+    index: Tensor,
+    weights: Tensor,
+    *,
+    side: int = SIDE,
+    reach: int = REACH,
+) -> Instances:
+    """`find_objects` about given frames, in so many samples to a patch side, by `reach` of them to each side.
+
+    `matrix` [3, 3] takes program units to photo pixels; `index` [N, 2] is what the instances are called.
+    """
+    colours = evidence.colours_for(sample_px(matrix, where, side=side))
+    patches = read(colours, matrix, where, count=side + 2 * reach, side=side)
     known = patches.known.float()[:, None]
-    middle = slice(reach, reach + SIDE)
+    middle = slice(reach, reach + side)
     own, own_known = patches.values[:, :, middle, middle], known[:, :, middle, middle]
     templates = mean_of_others(own, own_known, weights)
     offsets, peak, lead = correlate(patches.values, known, templates)
     # Rows of a patch run across the curve, columns along it.
-    return Instances(index, offsets.flip(1) / SIDE, peak, lead)
+    return Instances(index, offsets.flip(1) / side, peak, lead)
 
 
 def whitening(matrix: Tensor, where: Frames) -> Tensor:
