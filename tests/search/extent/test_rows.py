@@ -34,12 +34,12 @@ def cells_where(lattice: Lattice, holds, *, reach: int = 10, seen=lambda x, y: T
         for i in range(-reach, reach + 1):
             x, y = lattice.origin + np.array([i, j]) @ lattice.basis
             odds[j + reach, i + reach] = (SURE if holds(x, y) else -SURE) if seen(x, y) else 0.0
-    return Cells(odds, (-reach, -reach))
+    return Cells(odds, odds != 0, odds > 0, (-reach, -reach))
 
 
 def draws(layout: Layout, cells: Cells, lattice: Lattice) -> bool:
     """Whether a layout draws the cells that surely hold an object, and no others."""
-    j, i = np.nonzero(cells.odds > 0)
+    j, i = np.nonzero(cells.bits > 0)
     at = (np.stack([i, j], 1) + cells.first) @ lattice.basis
     drawn = np.array([place[:2] for place in points(layout.program())])
     apart = np.linalg.norm(drawn[:, None] - at[None], axis=2)
