@@ -21,7 +21,7 @@ from p3i.search.forms.asked import asks_for_itself
 from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.judge.accept import beyond_noise, chosen_among
-from p3i.search.judge.bits import by_explained, explained_bits
+from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.region import region_px
 from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import FINE, Evidence
@@ -65,7 +65,7 @@ def looked_closer(session: Session, search: Search) -> tuple[Session, list[Answe
     closer = _through(session, around)
     if around != box and explained_bits(closer.evidence, found[0]) > 0:
         found = [_seen_whole(closer, answer) for answer in found]
-    told = by_explained(closer.evidence, [found])
+    told = [dataclasses.replace(answer, worth=explained_bits(closer.evidence, answer)) for answer in found]
     place = f"{around.width} x {around.height} pixels from ({around.left}, {around.top}) on"
     note = f"found by a closer look at {place}"
     told = [dataclasses.replace(answer, notes=(*answer.notes, note)) for answer in told]

@@ -25,8 +25,8 @@ from p3i.search.forms.guess import Guess
 from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.sketches import Sketched, sketches
 from p3i.search.forms.spelled import lattice_filling
+from p3i.search.judge.accept import beyond_noise
 from p3i.search.judge.answered import answers_of
-from p3i.search.judge.bits import by_explained
 from p3i.search.judge.elsewhere import with_others
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
@@ -34,7 +34,7 @@ from p3i.search.optics.curve_focal import with_paid_focal
 from p3i.search.optics.lens import through_lens, with_lens
 from p3i.search.outcome import focal_of, outcome, told
 from p3i.search.propose.proposers import Proposer, proposers, share_of_time
-from p3i.search.result import NEEDED, STRUCTURES, StopReason, SynthesisResult
+from p3i.search.result import StopReason, SynthesisResult
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads
 
@@ -173,7 +173,7 @@ def _rivals(
         if len(done) >= max(most, top) or (done and not look.go_on()):
             return
         answers = best.of(sketch)
-        if sketch.by_hand is None and any(answer.score >= NEEDED for answer in answers):
+        if sketch.by_hand is None and any(beyond_noise(answer.worth) for answer in answers):
             if len(answers) >= top and worth(fit) < _RIVAL * worth(done[0]):
                 return
             if any(same_lattice(look.evidence, fit, other) for other in done):
@@ -183,18 +183,12 @@ def _rivals(
 
 
 def _answers(look: Session) -> list[Answer]:
-    """The answers of a search, by the bits that they explain; each structure's in its own order."""
+    """The answers of a search, those first that explain most."""
     best = searched(look)
-    return look.completed(lambda: _by_bits(look, best))
-
-
-def _by_bits(look: Session, best: Best) -> list[Answer]:
-    asked = sorted(best.asked(), key=lambda answer: -answer.worth)
-    groups = [[one for one in asked if one.structure == structure] for structure in STRUCTURES]
-    answers = by_explained(look.evidence, groups)
+    answers = sorted(best.asked(), key=lambda answer: -answer.worth)
     if asks_for_itself(look.config):
         return answers
-    return with_others(look, best.fits, answers, finish=_finished)
+    return look.completed(lambda: with_others(look, best.fits, answers, finish=_finished))
 
 
 def _finished(look: Session, fit: Fit) -> Answer | None:

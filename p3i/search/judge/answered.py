@@ -6,7 +6,6 @@ from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Drawn
-from p3i.search.fit.fitting import worth
 from p3i.search.forms.sketches import WALKED_SHAPES, Sketched, structure_of
 from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.evaluate import score_of_program
@@ -19,11 +18,14 @@ _FEWEST_RINGS = 2
 
 
 def answers_of(look: Session, sketch: Sketched, drawn: Drawn) -> list[Answer]:
-    """What a drawn program is as an answer; in the words of Table 1 where these are asked for, or none."""
+    """What a drawn program is as an answer, worth what it explains; in Table 1's words where asked for."""
     if sketch.by_hand is not None or sketch.shape in WALKED_SHAPES:
         return [_as_asked(look, drawn)]
     answer = _free(look, sketch, drawn)
-    return in_table1(look, drawn.fit, answer) if look.config.strict else [answer]
+    if look.config.recipe == "paper":
+        return [answer]
+    written = in_table1(look, drawn.fit, answer) if look.config.strict else [answer]
+    return [replace(one, worth=explained_bits(look.evidence, one)) for one in written]
 
 
 def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
@@ -31,26 +33,18 @@ def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
     if look.config.recipe == "paper":
         score = score_of_program(look.evidence, drawn.program)
         return Answer(drawn.program, sketch.structure, score, drawn.fit.covered)
-    if sketch.structure == "lattice":
-        return Answer(
-            drawn.program,
-            sketch.structure,
-            drawn.sure,
-            worth(drawn.fit),
-            drawn.notes,
-            readings=drawn.readings,
-        )
-    stated = drawn.fit.focal_mm == look.evidence.focal_mm
+    stated = sketch.structure == "lattice" or drawn.fit.focal_mm == look.evidence.focal_mm
     answer = Answer(
         drawn.program,
         sketch.structure,
         drawn.sure,
-        drawn.sure if sketch.structure == "circular" else worth(drawn.fit),
+        0.0,
         drawn.notes,
         focal_mm=None if stated else round(drawn.fit.focal_mm, 2),
         focal_reason="" if stated else "estimated from the pattern, its ring taken as a circle",
+        readings=drawn.readings,
     )
-    return answer if sketch.structure == "circular" else _without_empty_middle(look, answer)
+    return answer if sketch.structure != "hybrid" else _without_empty_middle(look, answer)
 
 
 def _as_asked(look: Session, drawn: Drawn) -> Answer:

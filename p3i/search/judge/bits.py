@@ -9,13 +9,11 @@ Each number is written in as many bits as it has values that can be told apart. 
 hypotheses: programs of c bits are 2^c at most, and of all programs together no more than 2^-b are expected
 to be worth b bits by chance (Kraft's inequality, and Markov's). That is what accepts (judge/accept.py).
 
-Lattices keep their own order (by the share of the picture that they explain), rings and hybrids come by
-their bits. What a person asked for (a sketch, a start, the paper's recipe) needs no bits.
+What a person asked for (a sketch, a start, the paper's recipe) needs no bits.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from p3i.interp.compile import compile
 from p3i.interp.pattern import without_doubles
@@ -23,7 +21,6 @@ from p3i.search.answer import Answer
 from p3i.search.fit.judged import sweeps_cells
 from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.forms.length import CAMERA_BITS, cost_bits
-from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import MOST_FALSE_ALARMS, recurrence_bits
 from p3i.search.look.thinned import thinned
@@ -41,24 +38,6 @@ class Explained:
     bits: float
     cost: float
     objects: int
-
-
-def by_explained(evidence: Evidence, answers: Sequence[Sequence[Answer]]) -> list[Answer]:
-    """The answers of several families, each list in its own order, as one list: most bits explained first.
-
-    Every answer's `worth` becomes what it explains. Lattices stay in their order, since their family knows
-    them best; what is no answer (judge/accept.py) stands in no other's way.
-    """
-    together: list[Answer] = []
-    for family in answers:
-        most = math.inf
-        for answer in family:
-            bits = explained_bits(evidence, answer)
-            worth = min(most, bits) if answer.structure == "lattice" else bits
-            together.append(replace(answer, worth=worth))
-            if beyond_noise(bits):
-                most = worth
-    return sorted(together, key=lambda answer: -answer.worth)
 
 
 def explained_bits(evidence: Evidence, answer: Answer) -> float:

@@ -15,11 +15,12 @@ import torch
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Fit
+from p3i.search.judge.accept import beyond_noise
 from p3i.search.judge.region import centers_px, region_px
 from p3i.search.look.cells import sample_points
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
-from p3i.search.result import NEEDED, Other
+from p3i.search.result import Other
 
 # A fit lies elsewhere where at most this share of its cells falls into the answer's region.
 _MOST_INSIDE = 0.3
@@ -37,7 +38,7 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     `fits` are all that were grown, the best first; `finish` works one out to a program. A pattern is told of
     only where its own program reaches what an answer needs, and once.
     """
-    if not answers or answers[0].score < NEEDED:
+    if not answers or not beyond_noise(answers[0].worth):
         return answers
     evidence, first = session.evidence, answers[0]
     regions, others = [_polygon(evidence, first)], []
@@ -46,7 +47,7 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
         return all(_inside(region, points) <= _MOST_INSIDE for region in regions)
 
     def keep(other: Answer) -> None:
-        if other.score >= NEEDED and elsewhere(_centers(evidence, other)):
+        if beyond_noise(other.worth) and elsewhere(_centers(evidence, other)):
             regions.append(_polygon(evidence, other))
             others.append(other)
 

@@ -1,6 +1,5 @@
 """An answer may be told with a focal of its own; centres, header and record follow it."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +8,9 @@ from found import finds
 
 from p3i import api
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
-from p3i.search import synthesize as synthesis
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.judge import accept
-from p3i.search.look.evidence import Evidence
 from p3i.search.synthesize import centers_px, focal_of
 from p3i.vision.image import Image
 
@@ -28,12 +25,8 @@ def image() -> Image:
 
 
 def with_answers(monkeypatch: pytest.MonkeyPatch, *answers: Answer) -> None:
-    def as_found(_evidence: Evidence, found: Sequence[Sequence[Answer]], *, needed: float) -> list[Answer]:
-        return [answer for family in found for answer in family if answer.score >= needed]
-
-    finds(monkeypatch, *answers)
     # The picture is noise, which no program explains: what an answer is worth is as the test says.
-    monkeypatch.setattr(synthesis, "by_explained", as_found)
+    finds(monkeypatch, *answers, bits=99.0)
     monkeypatch.setattr(accept, "score_of_program", lambda *_, **__: 0.9)
 
 
