@@ -1,4 +1,4 @@
-"""A picture of any program: what it draws, laid onto a textured ground. For programs of no known family."""
+"""A picture of any program: what it draws, laid onto a textured ground. For programs of any kind."""
 
 import math
 

@@ -85,7 +85,7 @@ class SearchConfig:
     ] = None
     exhaustive_s: Annotated[
         float | None,
-        "Seconds to walk through sketches of no known family as well, the shortest first.",
+        "Seconds for sketches that only the grid fills as well: single rows and spirals.",
         Spelt("--exhaustive", metavar="SECONDS"),
     ] = None
     strict: Annotated[bool, "Fit and print programs of the paper's Table 1 only."] = False
@@ -169,7 +169,7 @@ class SearchConfig:
             raise UsageError(f"the time must be more than 0 seconds, not {self.exhaustive_s:g}")
         how = asked[0] if asked else ""
         alone = {"sketch": ("auto",), "start": ("auto",), "recipe paper": ("auto", "lattice")}
-        # Rows and spirals are what no family looks for.
+        # Rows and spirals are what only the grid finds.
         alone |= {"exhaustive": ("auto", "lattice", "circular")}
         if self.structure not in alone.get(how, STRUCTURES):
             raise UsageError(f"--{how} and --structure {self.structure} contradict each other")

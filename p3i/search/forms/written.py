@@ -1,8 +1,8 @@
-"""A family's answers as starts for a sketch: the same pattern, as far as the sketch can say it.
+"""Answers as starts for a sketch: the same pattern, as far as the sketch can say it.
 
-A grid over all holes of a lattice has a point for one in a million; the lattice family looks at the picture
-instead. Where a sketch draws what a family draws, that family's answer, written in the sketch's numbers, is
-the place to begin, whatever the sketch fixes, ties together or bounds.
+A grid over all holes of a lattice has a point for one in a million; views and windows look at the picture
+instead. Where a sketch draws what is found without it, that answer, written in the sketch's numbers, is the
+place to begin, whatever the sketch fixes, ties together or bounds.
 """
 
 from collections.abc import Sequence

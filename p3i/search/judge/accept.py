@@ -46,7 +46,7 @@ def with_printed_scores(
 ) -> list[Answer]:
     """The answers, whose `worth` is in bits, with the scores that `p3i score` says of their programs.
 
-    While a program was fitted, its family knew more than it holds (other radii of a ring, numbers before they
+    While a program was fitted, more was known than it holds (other radii of a ring, numbers before they
     were rounded). What cannot be an answer keeps the score that it was refused with. `needed` is the score
     that was asked for, None where bits decide.
     """
@@ -67,7 +67,7 @@ def convincing(found: Sequence[Answer], told: Sequence[Answer], *, needed: float
     """Those of `told` that are answers: beyond noise by their bits, or, where a person asked, by the score
     `needed`.
 
-    `found` are the same answers with the scores that their families gave, which must suffice as well: what
+    `found` are the same answers with the scores that they were found with, which must suffice as well: what
     was not sure enough while more was known is none the surer.
     """
     if needed is None:

@@ -1,7 +1,7 @@
 """How well any program explains any photo: equation 2 as the paper prints it, and the agreement.
 
 The agreement is a function of photo and finished program (with the focal and the lens of its header) alone:
-what `synth` says of its answers and what `p3i score` says. What each family knew besides while it searched
+what `synth` says of its answers and what `p3i score` says. What was known besides while it was searched
 only decides what it goes on with, and may refuse an answer that this would let pass.
 """
 

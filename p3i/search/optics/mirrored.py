@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 # Poses that lie no further apart are one.
 _SAME_DEG = 5.0
 # The objects tell the poses apart where the misfit is so much larger: by its logarithm, times the objects (an
-# F-test, as for the focal in rings.py), and as a logarithm of likelihoods under the noise that places have;
+# F-test), and as a logarithm of likelihoods under the noise that places have;
 # or where they agree less than this share of what they do under the answer.
 _TELLS = 6.0
 _AS_ALIKE = 0.9

@@ -1,4 +1,4 @@
-"""A family's answer in a sketch's numbers: exact where the sketch can say it, near where it cannot."""
+"""An answer in a sketch's numbers: exact where the sketch can say it, near where it cannot."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The choice between structures: what a program costs, what it explains, and each family's own order."""
+"""The choice between structures: what a program costs, and what it explains."""
 
 from dataclasses import replace
 from functools import cache
