@@ -4,6 +4,7 @@ The same lattice may have its objects where lines cross or on the fields between
 floor or on the light ones. The likeliest is drawn; the others are told, and `--object` picks one of them.
 """
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -52,12 +53,7 @@ def other_readings(session: Session, answer: Answer, *, most: int) -> list[Answe
 
     None for an answer through a lens, whose lattice is one of another picture.
     """
-    found: list[Answer] = []
-    for one in _others(session, answer) if answer.lens_k1 is None else ():
-        if len(found) >= most:
-            break
-        found.append(one)
-    return found
+    return list(itertools.islice(_others(session, answer), most)) if answer.lens_k1 is None else []
 
 
 def _others(session: Session, answer: Answer) -> Iterator[Answer]:

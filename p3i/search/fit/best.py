@@ -7,8 +7,10 @@ from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.forms.sketches import Sketched
 
-# Where a program scores this, a pattern of another structure could not explain the photo better.
+# Where the objects of a program agree so well, or it explains more than the rings and hybrids of photos do, a
+# pattern of another structure could not explain the photo better.
 _BEYOND_DOUBT = 0.3
+_MOST_OF_CURVES = 1000.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +39,7 @@ class Best:
         Hybrids hold rings, and say more than these, however sure they are.
         """
         return not any(
-            answer.score > _BEYOND_DOUBT
+            (answer.score > _BEYOND_DOUBT or answer.worth > _MOST_OF_CURVES)
             and answer.structure != sketch.structure
             and not (sketch.structure == "hybrid" and answer.structure == "circular")
             for answer in self.asked()
