@@ -31,8 +31,7 @@ from p3i.errors import P3IError
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.judge.accept import convincing, with_printed_scores
-from p3i.search.judge.bits import by_explained
+from p3i.search.judge.accept import beyond_noise
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.outcome import focal_of
@@ -124,15 +123,14 @@ def measure(images: Iterable[tuple[str, Image]], config: SearchConfig, *, patter
             wanted = STRUCTURES if config.structure == "auto" else (config.structure,)
             alone = {one: dataclasses.replace(config, structure=one) for one in wanted}
             answers = {one: list(searched(Session(evidence, alone[one])).asked()) for one in wanted}
-            explained = by_explained(evidence, list(answers.values()), needed=NEEDED)
+            explained = [answer for some in answers.values() for answer in some]
         except Exception as bug:
             print(f"{name:40} BUG {type(bug).__name__}: {bug}", flush=True)
             traceback.print_exc()
             continue
         seconds = round(time.process_time() - begun, 2)
         best = {structure: _best(some) for structure, some in answers.items()}
-        told = with_printed_scores(evidence, explained, needed=NEEDED)
-        answered = any(answer.worth > 0 for answer in convincing(explained, told, needed=NEEDED))
+        answered = any(beyond_noise(answer.worth) for answer in explained)
         bits = {one: _most_bits(explained, one) for one in answers}
         scores = Scores(name=name, pattern=pattern, best=best, bits=bits, answered=answered, seconds=seconds)
         found.append(scores)

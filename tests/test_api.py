@@ -117,7 +117,7 @@ def test_an_unknown_option_is_refused_by_name(calls, photo: Path) -> None:
 
 def test_notes_of_the_reader_come_before_those_of_the_search(calls, photo: Path) -> None:
     image = dataclasses.replace(p3i.read_image(photo), notes=("of the reader",))
-    assert p3i.synth(image).notes == ("of the reader", "of the search")
+    assert p3i.synth(image).notes[:2] == ("of the reader", "of the search")
 
 
 def test_a_mask_as_an_array_hides_pixels(calls, photo: Path) -> None:

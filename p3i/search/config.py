@@ -18,6 +18,8 @@ Extent = Literal["found", "image"]
 Recipe = Literal["p3i", "paper"]
 
 STRUCTURES: tuple[Structure, ...] = get_args(Structure)
+FEWEST_OBJECTS = 4
+"""Fewer objects fix neither camera nor pattern, as fewer points fix no homography."""
 MOST_K1 = 0.4
 """Beyond this radial distortion no photo lens goes (p3i/interp/lens.py)."""
 

@@ -107,7 +107,7 @@ class Candidate:
         parts = ["the same lattice" if self.same_lattice else self.structure]
         if self.reading is not None:
             parts.append(f"objects on {self.reading.phrase} ({self.reading.probability:.2f})")
-        return ", ".join([*parts, f"score {self.score:.4f}"])
+        return ", ".join([*parts, f"score {self.score:.2f}"])
 
     def record(self) -> dict[str, Any]:
         """The candidate as JSON has it."""

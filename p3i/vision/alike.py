@@ -96,7 +96,7 @@ def alike_in(sheet: Sheet, likely: Floats | None = None) -> Alike | None:
 
 
 def _agreed_cell(cells: Floats, known: Mask, weights: Floats) -> tuple[Floats, Floats, Floats, float]:
-    """Mean cell and weights that explain each other: template, fit, weights, level."""
+    """Mean cell and weights that explain each other: template, fit, weights, level; cells [N, C, n, n]."""
     visible = known.mean(axis=(1, 2), dtype=np.float32)
     shown = visible > 0.3
     weights = weights * shown
@@ -114,7 +114,7 @@ def _agreed_cell(cells: Floats, known: Mask, weights: Floats) -> tuple[Floats, F
 def _second_kind(
     cells: Floats, known: Mask, weights: Floats, score: Floats, grid: tuple[int, int]
 ) -> Kind | None:
-    """Another kind of cell, alike among themselves, in gaps of the pattern; None where there is none.
+    """Another kind of cell [N, C, n, n], alike among themselves, in gaps of the pattern, or None.
 
     Only cells with parts of the pattern on both sides of them, along a row or a column, may found it, so
     that the border of a board is not taken for a kind.
@@ -150,7 +150,7 @@ def _second_kind(
 
 
 def between(passes: Mask) -> Mask:
-    """Cells [R, C] with passes on both sides of them along their row or their column."""
+    """Cells [H, W] with passes on both sides of them along their row or their column."""
     result = np.zeros_like(passes)
     for axis in (0, 1):
         before = np.cumsum(passes, axis=axis)

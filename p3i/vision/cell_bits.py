@@ -68,6 +68,7 @@ def cell_bits(alike: Alike, shown: Mask | None = None) -> CellBits:
 
 
 def _ramp(values: NDArray, low: float, high: float) -> Array:
+    """Values [N] as shares of the way from low to high, 0..1."""
     return np.clip((values - low) / (high - low), 0, 1).astype(float)
 
 
@@ -78,7 +79,7 @@ def _bits(passes: Array, trust: Array, misses: float, strays: float) -> Array:
 
 
 def _rates(passes: Array, trust: Array, grid: tuple[int, int]) -> tuple[float, float]:
-    """The shares of misses and of strays that explain the cells best, a rectangle of them the pattern."""
+    """The shares of misses and of strays that explain cells [N] best, a rectangle of them the pattern."""
 
     def explained(misses: float, strays: float) -> float:
         without = float((trust * (passes * np.log2(strays) + (1 - passes) * np.log2(1 - strays))).sum())
@@ -166,7 +167,7 @@ def _neighbour_agreement(alike: Alike, weights: Floats) -> tuple[Floats, Floats]
 
 
 def best_rectangle(worth: Array) -> tuple[int, int, int, int]:
-    """(i0, i1, j0, j1) of the rectangle of the greatest sum (Kadane's rule over pairs of rows)."""
+    """The ends i0, i1, j0, j1 of the rectangle of greatest sum in [H, W], by Kadane's rule over rows."""
     rows = worth.shape[0]
     sums = np.vstack([np.zeros(worth.shape[1]), np.cumsum(worth, axis=0)])
     best, at = -np.inf, (0, 1, 0, 1)

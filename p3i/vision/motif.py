@@ -159,6 +159,6 @@ def _blurred(region: NDArray, width: float) -> Array:
 
 
 def _top(values: Array) -> tuple[int, int]:
-    """The (row, column) of the greatest value."""
+    """The (row, column) of the greatest of values [n, n]."""
     row, column = divmod(int(values.argmax()), values.shape[1])
     return row, column

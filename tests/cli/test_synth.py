@@ -522,8 +522,8 @@ def two(search: Search, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_all_prints_a_program_for_each_pattern(photo, two, capsys) -> None:
     assert run(["synth", photo("a.png", FINDS_TWO), "--all"]) == 0
     out = capsys.readouterr().out
-    first, second = out.split("\n# pattern 2 of 2: lattice, score 0.5000\n")
-    assert first.startswith("# pattern 1 of 2: lattice, score 0.8765\n")
+    first, second = out.split("\n# pattern 2 of 2: lattice, score 0.50\n")
+    assert first.startswith("# pattern 1 of 2: lattice, score 0.88\n")
     assert p3i.loads(second).header is not None
     assert "x=3*i" in second and "x=3*i" not in first
 

@@ -66,7 +66,7 @@ def supercell(basis: np.ndarray) -> SuperCell:
 
 
 def row_of(basis: np.ndarray) -> int | None:
-    """Which step of a basis is a row that the next is shifted against by half, as bricks are; or None.
+    """Which step of a basis [2, 2] is a row that the next is shifted against by half, as bricks are; or None.
 
     Every step to the middle of the next row is one too, seen slantwise: the row is the straighter of the two.
     """

@@ -2,10 +2,10 @@
 
 from torch import Tensor
 
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.extent.layout import filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.extent.primitive import primitive
 from p3i.search.fit.fitted import Drawn, Fit
-from p3i.search.fit.fitting import FEWEST_CELLS
 from p3i.search.fit.grow import follow
 from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.layout import Layout
@@ -25,7 +25,7 @@ def drawn_lattice(look: Session, fit: Fit) -> Drawn | None:
     theta = Lattice.of(pattern, fit.theta).moved_to(middle.numpy()).theta(pattern)
     selected = fit.index[fit.support] - middle
     last = follow(evidence, pattern, theta, selected, generator=look.generator, rounds=_ROUNDS, finest=True)
-    if last is None or int(last.support.sum()) < FEWEST_CELLS:
+    if last is None or int(last.support.sum()) < FEWEST_OBJECTS:
         return None
     readings = primitive(evidence, pattern, last)
     best = _surest(look, readings)

@@ -127,7 +127,7 @@ def _whole(outline: Outline) -> bool:
 def layout_at(
     evidence: Evidence, lattice: Lattice, ground: Tensor, *, readings: tuple[Reading, ...]
 ) -> Layout | None:
-    """The objects of a lattice that lie at its points, one of the `readings`; else as found_layout."""
+    """The objects of a lattice that lie at its points, one of the `readings`, around cells [N, 2]."""
     image = evidence.part.image
     matrix, support = _seen(evidence, lattice, ground)
     cells = cells_that_hold(

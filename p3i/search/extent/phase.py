@@ -56,7 +56,8 @@ def find_phases(
 
     Empty where no cell shows.
 
-    Convention: as in p3i.search.extent.presence.cells_that_hold; the plane may have any origin.
+    Shapes and convention as in p3i.search.extent.presence.cells_that_hold: pixels [H, W, 3], valid [H, W],
+    support [H, W]; the plane may have any origin.
     """
     small, mask, matrix = working_size(pixels, valid, image_from_plane)
     if support is not None and support.shape != mask.shape:

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import side_of_cell
 from p3i.search.forms.lattice import Lattice, reduce_basis
@@ -53,7 +54,6 @@ _LEAST_AGREEMENT = 0.2
 _NEARLY_AS_GOOD = 0.5
 # This many cells, of one coset or of all, are enough to tell one lattice from another.
 _MOST_CELLS = 200
-_FEWEST = 4
 # Where so many of the cells know their coset, the cosets are kinds, and the doubled cell is the period:
 # halfway between one half, which is no rule, and all.
 _TOLD = 0.75
@@ -76,7 +76,7 @@ def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tens
     cells the fit's own is the only one.
     """
     found = _Ground(fit.theta, fit.index[fit.support])
-    if len(found.index) < _FEWEST:
+    if len(found.index) < FEWEST_OBJECTS:
         return [(found.theta, found.index)]
     for _ in range(3):  # each turn divides the cell by 2 to 4
         finer = _finer(evidence, pattern, found)
@@ -122,7 +122,7 @@ def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Gr
     basis, change = _reduced(best[1].astype(float) @ lattice.basis)
     index = ground.index.numpy() @ np.linalg.inv(best[1])
     whole = (np.abs(index - np.round(index)) < 1e-6).all(1)
-    if whole.sum() < _FEWEST:
+    if whole.sum() < FEWEST_OBJECTS:
         return None, 0.0
     index = torch.from_numpy(np.round(index[whole]) @ change)
     return _Ground(lattice.with_basis(basis).theta(pattern), index), _told(evidence, pattern, ground, best[2])

@@ -111,7 +111,7 @@ def _in_a_box(bits: Array) -> float:
 
 
 def bases_with_rows(basis: Array) -> list[Whole]:
-    """The changes to the bases that are looked at: none, then each row with the shortest step to the next."""
+    """The changes [2, 2] of a basis that are looked at: none, then each row with the shortest next step."""
     found = [np.eye(2, dtype=int)]
     for row in _ROWS:
         along = np.array(row) @ basis

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import fitted, measured, numbers_of, values_of
 from p3i.search.forms.spelled import ring_filling
@@ -11,7 +12,6 @@ from p3i.search.look.session import Session
 _PRESENT = 0.4
 # A ring is closed where at most this share of it lacks in one piece.
 _MOST_LACKING = 0.2
-_FEWEST = 4
 # Growth looks this many places beyond an arc's ends, and goes on for so many rounds.
 _REACH = 3
 _MOST_GROWTHS = 8
@@ -30,7 +30,7 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
     values = values_of(fit)
     step = 360 / count
     values |= {"draw.x.angle.j": step, "draw.x.angle.1": values["draw.x.angle.1"] + first * step}
-    filling = ring_filling(0, drawn=max(length, _FEWEST))
+    filling = ring_filling(0, drawn=max(length, FEWEST_OBJECTS))
     arc = fitted(look, filling, values, focal_mm=fit.focal_mm, rounds=2)
     if arc is None:
         return fit

@@ -2,6 +2,7 @@
 
 import torch
 
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.arc import as_far_as_it_goes
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import grow
@@ -25,8 +26,6 @@ _DOUBT = 0.05
 _LEAST_WORTH = 5e-4
 # A lattice of this worth is certain enough that only a better one could matter.
 _CERTAIN = 0.025
-FEWEST_CELLS = 4
-"""Fewer cells than this are no lattice."""
 
 
 def fit_places(look: Session, guess: Guess) -> Fit | None:
@@ -75,9 +74,9 @@ def worth(fit: Fit) -> float:
         return curve_score(fit) if rings == 1 else fit.mean * len(fit.contrast)
     contrast = fit.contrast[fit.support]
     count = len(contrast)
-    if count < FEWEST_CELLS:
+    if count < FEWEST_OBJECTS:
         return 0.0
-    beyond_chance = max(1 - _FEW_CELLS / count, _DOUBT * (1 - FEWEST_CELLS / count))
+    beyond_chance = max(1 - _FEW_CELLS / count, _DOUBT * (1 - FEWEST_OBJECTS / count))
     return fit.covered * float(contrast.mean()) * beyond_chance
 
 

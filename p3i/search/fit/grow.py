@@ -14,6 +14,7 @@ from torch import Tensor
 
 from p3i.interp.camera import Camera
 from p3i.interp.pattern import Pattern
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.features import refine
 from p3i.search.fit.fitted import SUPPORT, Fit
 from p3i.search.fit.robust import fit_instances
@@ -38,14 +39,13 @@ _ROUNDS = 9
 _MOST_REFINED = 160
 # The tilts under which a proposal without one is tried.
 _TILTS_DEG = (0.0, 35.0, 55.0)
-_FEWEST = 4
 
 
 def measure(level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | None = None) -> Fit | None:
     """How well theta explains the picture. `start` [M, 2] are cells that the mean starts from."""
     around = None if start is None else start.median(0).values
     index = cells_in_view(level, pattern, theta, around=around)
-    if len(index) < _FEWEST:
+    if len(index) < FEWEST_OBJECTS:
         return None
     weights = torch.ones(len(index)) if start is None else _members(index, start).float()
     if float(weights.sum()) < 3:
@@ -99,14 +99,14 @@ def follow(
             best = fit
         selected, weights = _grown(fit, selected)
         now = {tuple(cell) for cell in selected.tolist()}
-        if len(now) < _FEWEST or (turn >= 2 and len(now ^ previous) <= 0.04 * len(now)):
+        if len(now) < FEWEST_OBJECTS or (turn >= 2 and len(now ^ previous) <= 0.04 * len(now)):
             break
         previous = now
         few = _sample_of(len(selected), generator)
         found = find_instances(
             level, pattern, theta, selected[few], torch.where(weights > SUPPORT, weights, 0.0)[few]
         )
-        if int((found.certainty > 0).sum()) < _FEWEST:
+        if int((found.certainty > 0).sum()) < FEWEST_OBJECTS:
             break
         theta = fit_instances(level, pattern, theta, found, weights=found.certainty.double())
     return best
@@ -119,7 +119,7 @@ def _seed(evidence: Evidence, pattern: Pattern, guess: Guess) -> tuple[Tensor, T
     theta = guess.lattice.reduced().theta(pattern)
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
     index = cells_in_view(level, pattern, theta)
-    if len(index) < _FEWEST:
+    if len(index) < FEWEST_OBJECTS:
         return None
     support = _smoothed(index, _neighbour_contrast(level, pattern, theta, index).clamp(min=0))
     if float(support.sum()) <= 0:

@@ -19,7 +19,7 @@ from p3i.grammar.ast import Polar
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
-from p3i.search.config import SearchConfig
+from p3i.search.config import FEWEST_OBJECTS, SearchConfig
 from p3i.search.forms.lattice import Lattice, cell_px, cells_in_view, in_shortest_steps
 from p3i.search.look.cells import HALF_STEPS, contrast, sample_grid, sample_points
 from p3i.search.look.evidence import Evidence, Level
@@ -37,8 +37,6 @@ from p3i.search.look.thinned import thinned
 MOST_JUDGED = 600
 """More objects than this are not needed to judge a program."""
 _ROUNDS = 4
-# Fewer cells than this that show whole say nothing; then all draws in sight are looked at.
-_FEWEST_CELLS = 4
 _FEWEST_PATCHES = 3
 # A cell as flat as a line is none.
 _LEAST_AREA = 1e-6
@@ -95,7 +93,7 @@ def judged_cells(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedCells]:
         level = evidence.level_for(side, name=name)
         whole = cells_in_view(level, pattern, theta, most=_MOST_IN_VIEW)
         drawn = _drawn(whole, pattern)
-        enough = len(drawn) >= _FEWEST_CELLS
+        enough = len(drawn) >= FEWEST_OBJECTS
         index = drawn if enough else seen
         index = index[thinned(index, MOST_JUDGED)]
         found = contrast(

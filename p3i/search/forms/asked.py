@@ -8,14 +8,12 @@ from p3i.grammar.departures import departures
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.sketch import Hole, Sketch
 from p3i.interp.degenerate import FAR
-from p3i.search.config import SearchConfig
+from p3i.search.config import FEWEST_OBJECTS, SearchConfig
 from p3i.search.forms.filling import draws, whole_program_sketch
 from p3i.search.forms.settings import check_settings
 from p3i.search.result import NEEDED, StopReason
 from p3i.size import Size
 
-# A sketch that draws fewer objects than this fixes neither camera nor pattern.
-_FEWEST_OBJECTS = 4
 # Canvases whose sides differ in proportion by more than this are not the same picture.
 _SAME_SHAPE = 0.02
 
@@ -81,13 +79,13 @@ def check_asked(config: SearchConfig, size: Size) -> None:
     drawn = 0
     for drawn_here in draws(sketch):
         drawn = max(drawn, drawn_here)
-        if drawn >= _FEWEST_OBJECTS:
+        if drawn >= FEWEST_OBJECTS:
             break
     else:
         raise SketchError(
             place=name,
             reason=f"it draws {drawn} objects at most, too few to fix camera and pattern",
-            mend=f"let its loops draw {_FEWEST_OBJECTS} or more",
+            mend=f"let its loops draw {FEWEST_OBJECTS} or more",
         )
 
 

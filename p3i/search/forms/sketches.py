@@ -1,7 +1,7 @@
 """The enumerator: every sketch that a proposer can write, and which ones a search takes up, in which order.
 
 Every sketch is put together from the productions of the grammar with a hole for every number. Its length in
-bits is what it takes to name the productions, and `BITS_A_NUMBER` for each hole that is a number of its own.
+bits is what it takes to name the productions, and `NUMBER_BITS` for each hole that is a number of its own.
 Sketches that a shorter one contains in another spelling are left out: x and y have the same form, and the
 radius and the angle of a curve are one number in both.
 
@@ -22,6 +22,7 @@ from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
 from p3i.search.forms.filling import whole_program_sketch
+from p3i.search.forms.length import NUMBER_BITS, PRODUCTION_BITS
 from p3i.search.result import STRUCTURES, StructureFound
 
 Shape = Literal["lattice", "row", "ring", "arc", "spiral", "rings in rings", "fan", "rings in a row", "any"]
@@ -29,9 +30,6 @@ Shape = Literal["lattice", "row", "ring", "arc", "spiral", "rings in rings", "fa
 
 WALKED_SHAPES: tuple[Shape, ...] = ("row", "spiral")
 """Shapes that only the grid writes: they take long, and are taken up where somebody asks for it."""
-BITS_A_NUMBER = 8.0
-"""What it costs to write down one number: a range of 256 distinguishable values."""
-_BITS_A_CHOICE = 1.0
 # What a sketch outside Table 1 costs on top: one that the paper has no word for is less likely.
 _BITS_BEYOND = 16.0
 _MOST_GUARDS = 3
@@ -195,7 +193,7 @@ def _made(
     lines.append("    " * (len(lines) - 1) + f"Draw(x={form.x}, y={form.y})")
     text = "\n".join(lines) + "\n"
     numbers = text.count("??") + len(set(_NAMED.findall(text)))
-    bits = BITS_A_NUMBER * numbers + _BITS_A_CHOICE * (len(loops) + guards)
+    bits = NUMBER_BITS * numbers + PRODUCTION_BITS * (1 + len(loops) + guards)
     bits += 0.0 if form.table1 else _BITS_BEYOND
     words = [form.shape, form.spelling, f"{guards} guards" if guards else ""]
     name = ", ".join(word for word in words if word)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Drawn
 from p3i.search.forms.sketches import WALKED_SHAPES, Sketched, structure_of
 from p3i.search.judge.bits import explained_bits
@@ -12,8 +13,6 @@ from p3i.search.judge.evaluate import score_of_program
 from p3i.search.judge.table1 import in_table1
 from p3i.search.look.session import Session
 
-# Fewer objects in sight say nothing.
-_FEWEST = 4
 _FEWEST_RINGS = 2
 
 
@@ -50,7 +49,7 @@ def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
 def _as_asked(look: Session, drawn: Drawn) -> Answer:
     """A filling of a person's sketch."""
     program = drawn.program
-    if int(look.evidence.in_sight(compile(program)).sum()) < _FEWEST:
+    if int(look.evidence.in_sight(compile(program)).sum()) < FEWEST_OBJECTS:
         return Answer(program, structure_of(program), 0.0, 0.0)
     # What a curve explains beside its draws is told in its score, but makes it no better a filling.
     score = score_of_program(look.evidence, program)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import numbers_of, values_of
 from p3i.search.forms.guess import Base, Guess
@@ -16,7 +17,6 @@ from p3i.search.propose.votes import ring_proposals
 _CLOSED_DEG = 300.0
 # A ring that is less sure than this, or has fewer objects, starts nothing.
 _LEAST_QUALITY = 0.15
-_FEWEST = 4
 
 
 def ring_guesses(look: Session) -> Iterator[Guess]:
@@ -42,7 +42,7 @@ def guesses_around(look: Session, rings: Sequence[Drawn]) -> Iterator[Guess]:
     done: list[BaseRing] = []
     for ring in rings:
         fit = ring.fit
-        if min(fit.quality, 1.5 * ring.sure) < _LEAST_QUALITY or len(fit.contrast) < _FEWEST:
+        if min(fit.quality, 1.5 * ring.sure) < _LEAST_QUALITY or len(fit.contrast) < FEWEST_OBJECTS:
             continue
         base = _base_of(fit)
         if any(_same(base, other) for other in done):
