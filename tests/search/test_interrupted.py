@@ -132,7 +132,7 @@ class Said(Once):
 IN_A_CALL = [
     ("lattice", "synthesize.with_others", 1),
     ("ring", "synthesize.fit_places", 2),
-    ("ring", "extent.ring.as_far_as_it_goes", 1),
+    ("ring", "fit.fitting.as_far_as_it_goes", 1),
     ("ring", "extent.ring.places", 2),
     ("hybrid", "synthesize.fit_places", 2),
     ("hybrid", "extent.further_rings._one_more", 1),
@@ -198,7 +198,7 @@ def test_a_second_interrupt_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> Non
         raise KeyboardInterrupt
 
     search = ring(monkeypatch)
-    monkeypatch.setattr("p3i.search.extent.ring.as_far_as_it_goes", raising)
+    monkeypatch.setattr("p3i.search.fit.fitting.as_far_as_it_goes", raising)
     with pytest.raises(KeyboardInterrupt):
         search()
 

@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 import pytest
 from drawn import DrawnRing, noise_image, tilt_error_deg
-from p3i.search.extent.arc import as_far_as_it_goes
 from truth import small_scene
 
 from p3i.cli.main import run
@@ -17,6 +16,7 @@ from p3i.grammar.parser import parse
 from p3i.interp.unroll import nest, points
 from p3i.search import synthesize as synthesize_module
 from p3i.search.config import SearchConfig
+from p3i.search.fit.arc import as_far_as_it_goes
 from p3i.search.fit.places import measured
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import ring_filling

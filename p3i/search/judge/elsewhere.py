@@ -22,8 +22,8 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import Other
 
-# A fit lies elsewhere where at most this share of its cells falls into the answer's region.
-_MOST_INSIDE = 0.3
+# A fit lies elsewhere where most of its cells do: at most this share of them falls into the region of an answer.
+_MOST_INSIDE = 0.5
 # Fits that explain this much of the photo are worth working out for a note ...
 _LEAST_SCORE = 0.02
 # ... and planes whose normals differ by more than this are two.

@@ -57,7 +57,7 @@ def test_a_score_is_of_the_objects_whatever_steps_they_are_written_in() -> None:
     inner = For("j", Affine(), Affine(constant=across + down), guarded)
     other = replace(whole, world=replace(world, body=inner))
     assert len(points(other)) == len(points(whole))
-    scores = [evaluate(scene.image(), program, CONFIG).normalised for program in (whole, other)]
+    scores = [evaluate(scene.image(), program, CONFIG).agreement for program in (whole, other)]
     assert scores[0] == pytest.approx(scores[1], abs=1e-6)
     told = [Answer(program, "lattice", 1.0, 0.0) for program in (whole, other)]
     bits = [explained(evidence_of(scene), answer) for answer in told]

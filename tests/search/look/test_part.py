@@ -58,7 +58,7 @@ def test_the_score_of_the_program_is_what_was_printed(closer: SynthesisResult, p
     box = around(SMALL, 25)
     assert closer.window is not None and closer.record()["window"] == list(closer.window)
     assert np.abs(np.array(closer.window[:2]) - box[0]).max() <= 1
-    assert p3i.score(photo, closer.program).normalised == pytest.approx(closer.score, abs=1e-6)
+    assert p3i.score(photo, closer.program).agreement == pytest.approx(closer.agreement, abs=1e-6)
 
 
 def test_nothing_is_drawn_outside_the_region(photo: Image) -> None:
