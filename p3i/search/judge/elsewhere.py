@@ -22,7 +22,7 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import Other
 
-# A fit lies elsewhere where most of its cells do: at most this share of them falls into the region of an answer.
+# A fit lies elsewhere where most of its cells do: at most this share of them lies in an answer's region.
 _MOST_INSIDE = 0.5
 # Fits that explain this much of the photo are worth working out for a note ...
 _LEAST_SCORE = 0.02
