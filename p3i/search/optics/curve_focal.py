@@ -8,10 +8,10 @@ fits best (`fit/settle.py`).
 from dataclasses import replace
 
 from p3i.interp.camera import Camera
+from p3i.interp.compile import compile
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import follow, measured, numbers_of, values_of
 from p3i.search.fit.settle import objects_of, saved_bits, settled
-from p3i.search.forms.whole import whole_filling
 from p3i.search.judge.bits import worth_of_numbers
 from p3i.search.look.evidence import Evidence
 
@@ -31,10 +31,10 @@ def with_paid_focal(evidence: Evidence, fit: Fit, *, keep_side: bool = False) ->
     if start is None:
         return fit
     kept = follow(evidence, start, rounds=_ROUNDS, keep_side=keep_side)
-    objects = objects_of(evidence, fit.filling.program(fit.z, ()), focal_mm=fit.focal_mm)
-    held = whole_filling(kept.filling.program(kept.z, ()))
-    if objects is None or held is None:
+    objects = objects_of(evidence, fit.program(), focal_mm=fit.focal_mm)
+    if objects is None:
         return fit
+    held = objects.filling.z_of(compile(kept.program()).theta)
     more = settled(objects, "focal")
-    less = settled(replace(objects, numbers=held[1], focal_mm=assumed))
+    less = settled(replace(objects, numbers=held, focal_mm=assumed))
     return fit if worth_of_numbers(saved_bits(less, more, share=more.share)) > 0 else kept

@@ -3,11 +3,13 @@
 import pytest
 from drawn import DrawnRing
 
-from p3i.search.fit.places import CurveFit, follow, measured
+from p3i.search.fit.fitted import Fit
+from p3i.search.fit.places import follow, measured, numbers_of
+from p3i.search.forms.spelled import ring_filling
 from p3i.search.optics.curve_focal import with_paid_focal
 
 
-def free(ring: DrawnRing) -> CurveFit:
+def free(ring: DrawnRing) -> Fit:
     """A ring fitted with the focal free, from its own numbers under the assumed one."""
     filling = ring.filling()
     start = measured(ring.evidence(), filling, ring.numbers(filling), focal_mm=35.0)
@@ -26,3 +28,13 @@ def test_a_ring_seen_straight_on_goes_back_to_the_assumed_focal() -> None:
     fit = free(ring)
     assert fit.focal_mm != 35.0
     assert with_paid_focal(ring.evidence(), fit).focal_mm == 35.0
+
+
+def test_an_arc_whose_step_happens_to_close_a_ring_may_go_back_to_one_that_does_not() -> None:
+    """The first has no number for its step, and the second has."""
+    ring = DrawnRing(count=10, slots=12, rx_deg=0.0, ry_deg=3.0)
+    filling = ring_filling(0, drawn=10)
+    values = ring_filling(12).named(ring.numbers(ring_filling(12))) | {"draw.x.angle.j": 30.0}
+    closing = measured(ring.evidence(), filling, numbers_of(filling, values), focal_mm=50.0)
+    assert closing is not None
+    assert with_paid_focal(ring.evidence(), closing).focal_mm in (35.0, 50.0)
