@@ -25,8 +25,9 @@ from p3i.search.config import SearchConfig
 from p3i.search.fit.grow import measure
 from p3i.search.forms.guess import lattice_guess
 from p3i.search.judge import accept
+from p3i.search.outcome import focal_of
 from p3i.search.result import NEEDED, StopReason, SynthesisResult
-from p3i.search.synthesize import focal_of, synthesize
+from p3i.search.synthesize import synthesize
 from p3i.size import Size
 from p3i.vision.image import Image
 

@@ -46,8 +46,9 @@ _FEWEST = 2
 _CLOSER_SIDE, _CLOSER_REACH = 24, 8
 # Degrees of freedom of the noise. Of its scale it says (4 + 2) / (4 + 4) of what a Gaussian would.
 _TAIL = 4.0
-# The scale of residuals, in units of `whitening`: where to begin, and the least that is believed.
-_VARIANCE, _LEAST_VARIANCE = 0.25, 1e-4
+# The scale of residuals, in units of `whitening`: where to begin, and the least that is believed, which is a
+# fiftieth of a pixel; interpolation between pixels is no better.
+_VARIANCE, _LEAST_VARIANCE = 0.25, 0.0044
 _MOST_STEPS, _SCALINGS = 20, 5
 _SETTLED = 1e-3
 _MOST_ALIKE = 0.6

@@ -11,7 +11,8 @@ from p3i.grammar.ast import Affine, CameraPose, Draw, For, Program
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.judge import accept
-from p3i.search.synthesize import centers_px, focal_of
+from p3i.search.judge.region import centers_px
+from p3i.search.outcome import focal_of
 from p3i.vision.image import Image
 
 ROWS = For("j", Affine(), Affine(constant=3), Draw(Affine(9), Affine(0, 9)))
