@@ -95,8 +95,8 @@ class Cells:
             found[at] = table[j, i]
             return found
 
-        tables = [moved(table) for table in (self.bits, self.judged, self.entire)]
-        return Cells(*tables, (int(low[0]), int(low[1])))
+        first = (int(low[0]), int(low[1]))
+        return Cells(moved(self.bits), moved(self.judged), moved(self.entire), first)
 
     def outline(self) -> Outline | None:
         """What of the cells is drawn; None where nothing speaks for any."""
