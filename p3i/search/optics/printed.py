@@ -53,6 +53,8 @@ def as_precise_as_fitted(evidence: Evidence, answer: Answer) -> Answer:
     moving = [k for k, value in enumerate(numbers.tolist()) if value != 0]
     pattern = filling.pattern
     index = pattern.index[evidence.in_sight(pattern, filling.theta(numbers), focal_mm=focal_mm)].double()
+    if len(index) == 0:
+        return answer
 
     def spread_over(part: Tensor) -> Tensor:
         full = numbers.expand(*part.shape[:-1], -1).clone()
