@@ -45,7 +45,9 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
             reason = StopReason.OUTSIDE_TABLE_1
         least, stop = look.evidence.least_period_px, look.stopped or reason
         bits = None if asked else max((answer.worth for answer in printed), default=None)
-        facts = {"agreement": best, "bits": bits, "needed": needed, "least_period_px": least}
+        facts = {"agreement": best, "bits": bits, "least_period_px": least}
+        if asked:
+            facts["needed"] = needed
         refused = told(config, assumed, None, stop, **facts)
         look.record("answer", program=None, score=best, reason=refused.reason)
         return refused

@@ -3,6 +3,7 @@
 Imports neither torch nor numpy.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -11,8 +12,12 @@ from typing import Any, Literal, get_args
 from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
 
+MOST_FALSE_ALARMS = 0.05
+"""What is expected less often than this in a picture without a pattern is no chance."""
+NEEDED_BITS = -math.log2(MOST_FALSE_ALARMS)
+"""So many bits net make an answer."""
 NEEDED = 0.13
-"""The agreement that suffices for an answer (docs/benchmarks.md says what it was calibrated on)."""
+"""The agreement that suffices where a person asked for a program."""
 
 StructureFound = Literal["lattice", "circular", "hybrid"]
 STRUCTURES: tuple[StructureFound, ...] = get_args(StructureFound)
@@ -222,6 +227,8 @@ class SynthesisResult:
             and self.needed is not None
         ):
             why = f"{why} (best {self.agreement:.2f}, needs {self.needed:.2f})"
+        elif self.stop is StopReason.NO_PATTERN and self.bits is not None:
+            why = f"{why} (the best found is worth {self.bits:.0f} bits, an answer {NEEDED_BITS:.1f})"
         if self.stop is StopReason.NO_SUCH_OBJECT:
             return f"{why} (it offers {', '.join(reading.name for reading in self.readings)})"
         if self.least_period_px is None or self.program is not None:

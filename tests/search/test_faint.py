@@ -7,8 +7,7 @@ import numpy as np
 
 import p3i
 from p3i.search.config import SearchConfig
-from p3i.search.look.recurrence import MOST_FALSE_ALARMS
-from p3i.search.result import NEEDED, StopReason, SynthesisResult
+from p3i.search.result import MOST_FALSE_ALARMS, NEEDED, StopReason, SynthesisResult
 from p3i.vision.image import Image
 
 COLUMNS, ROWS, CELL_PX = 19, 17, 20

@@ -68,15 +68,15 @@ def test_a_refusal_of_a_place_names_those_that_the_cell_offers() -> None:
 @pytest.mark.parametrize(
     ("changes", "title"),
     [
-        ({}, "lattice, score 0.3500"),
-        ({"reading": CROSSING}, "lattice, objects on the crossings (0.70), score 0.3500"),
+        ({}, "lattice, score 0.35"),
+        ({"reading": CROSSING}, "lattice, objects on the crossings (0.70), score 0.35"),
         (
             {"reading": FIELD, "same_lattice": True},
-            "the same lattice, objects on the fields (0.25), score 0.3500",
+            "the same lattice, objects on the fields (0.25), score 0.35",
         ),
         (
             {"reading": Reading("3", 0.02, (0.0, 0.0))},
-            "lattice, objects on place 3 of the cell (0.02), score 0.3500",
+            "lattice, objects on place 3 of the cell (0.02), score 0.35",
         ),
     ],
 )

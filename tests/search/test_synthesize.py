@@ -26,7 +26,7 @@ from p3i.search.fit.grow import measure
 from p3i.search.forms.guess import lattice_guess
 from p3i.search.judge import accept
 from p3i.search.outcome import focal_of
-from p3i.search.result import NEEDED, StopReason, SynthesisResult
+from p3i.search.result import NEEDED, NEEDED_BITS, StopReason, SynthesisResult
 from p3i.search.synthesize import synthesize
 from p3i.size import Size
 from p3i.vision.image import Image
@@ -114,9 +114,11 @@ def test_what_has_no_pattern_is_refused_with_its_evidence(pixels: np.ndarray) ->
     result = synthesize(photo(pixels), SearchConfig())
     assert (result.program, result.stop) == (None, StopReason.NO_PATTERN)
     assert result.centers == () and result.candidates == ()
-    assert result.agreement is not None and result.agreement < NEEDED == result.needed
+    assert result.agreement is not None and result.agreement < NEEDED and result.needed is None
     assert result.score is None and result.margin_bits is None
-    assert result.reason == f"no regular pattern (best {result.agreement:.2f}, needs {NEEDED:.2f})"
+    assert result.bits is None or result.bits < NEEDED_BITS
+    told = "" if result.bits is None else f" (the best found is worth {result.bits:.0f} bits, an answer 4.3)"
+    assert result.reason == f"no regular pattern{told}"
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from p3i.search.extent.phase import WEIGHTS
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.recurrence import MOST_FALSE_ALARMS
 from p3i.search.look.unrolled import colours_at, gradients, polar_points
+from p3i.search.result import MOST_FALSE_ALARMS
 from p3i.vision.cells import median_cell
 from p3i.vision.motif import concentration, contrast, parts, symmetry
 

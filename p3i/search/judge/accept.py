@@ -17,7 +17,7 @@ from dataclasses import replace
 from p3i.search.answer import Answer
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.recurrence import MOST_FALSE_ALARMS
+from p3i.search.result import MOST_FALSE_ALARMS
 
 
 def chosen_among(ways: int, answer: Answer) -> Answer:

@@ -22,8 +22,9 @@ from p3i.search.fit.judged import sweeps_cells
 from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.forms.length import CAMERA_BITS, cost_bits
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.recurrence import MOST_FALSE_ALARMS, recurrence_bits
+from p3i.search.look.recurrence import recurrence_bits
 from p3i.search.look.thinned import thinned
+from p3i.search.result import MOST_FALSE_ALARMS
 
 # More objects than this are judged by a part of them.
 _MOST_JUDGED = 200

@@ -32,8 +32,6 @@ from p3i.vision.warp import sample, sample_valid
 
 Floats = NDArray[np.float32]
 
-MOST_FALSE_ALARMS = 0.05
-"""What is expected less often than this in a picture without a pattern is no chance."""
 ALONG = 16
 """Samples along a sector; waves up to half as many can be told."""
 ACROSS = 14

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from p3i.language import loads
 from p3i.search.answer import Answer
 from p3i.search.judge.accept import beyond_noise, convincing, false_alarms
-from p3i.search.look.recurrence import MOST_FALSE_ALARMS
-from p3i.search.result import NEEDED, StructureFound
+from p3i.search.result import MOST_FALSE_ALARMS, NEEDED, StructureFound
 
 PROGRAM = loads("SetCameraPose(rx=1, ry=2)\nfor i in range(0, 9):\n    Draw(x=9*i, y=0)\n")
 ENOUGH = -math.log2(MOST_FALSE_ALARMS)
