@@ -12,14 +12,12 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import torch
 
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.extent.layout import found_layout, layout_fit, refitted
 from p3i.search.forms.asked import asks_for_itself
 from p3i.search.forms.lattice import Lattice
-from p3i.search.forms.spelled import lattice_filling
 from p3i.search.judge.accept import beyond_noise, chosen_among
 from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.region import region_px
@@ -63,12 +61,11 @@ def looked_closer(session: Session, search: Search) -> tuple[Session, list[Answe
         return closer, []
     around = _with_surroundings(session.evidence, found[0], box)
     closer = _through(session, around)
-    if around != box and explained_bits(closer.evidence, found[0]) > 0:
+    if around != box:
         found = [_seen_whole(closer, answer) for answer in found]
-    told = [dataclasses.replace(answer, worth=explained_bits(closer.evidence, answer)) for answer in found]
     place = f"{around.width} x {around.height} pixels from ({around.left}, {around.top}) on"
     note = f"found by a closer look at {place}"
-    told = [dataclasses.replace(answer, notes=(*answer.notes, note)) for answer in told]
+    told = [dataclasses.replace(answer, notes=(*answer.notes, note)) for answer in found]
     chosen = [chosen_among(PLACES**2, answer) for answer in told]
     return closer, [answer for answer in chosen if beyond_noise(answer.worth)]
 
@@ -122,12 +119,13 @@ def _with_surroundings(evidence: Evidence, answer: Answer, box: Box) -> Box:
 
 
 def _seen_whole(session: Session, answer: Answer) -> Answer:
-    """The answer with the objects that it has in the session's part of the photo, if that says more."""
-    evidence, pattern = session.evidence, lattice_filling().pattern
-    drawn = compile(answer.program)
-    value = dict(zip(drawn.paths, drawn.theta.tolist(), strict=True))
-    theta = torch.tensor([value.get(path, 0.0) for path in pattern.paths], dtype=torch.float64)
-    found = found_layout(evidence, Lattice.of(pattern, theta), drawn.index.double())
+    """The answer, worth what it explains of the session's part of the photo, with the objects that it has
+    there if that says more."""
+    evidence, drawn = session.evidence, compile(answer.program)
+    answer = dataclasses.replace(answer, worth=explained_bits(evidence, answer))
+    found = None
+    if answer.worth > 0:
+        found = found_layout(evidence, Lattice.of(drawn, drawn.theta), drawn.index.double())
     if found is None:
         return answer
     layout = refitted(evidence, found[0])
@@ -137,4 +135,5 @@ def _seen_whole(session: Session, answer: Answer) -> Answer:
     wider = dataclasses.replace(
         answer, program=layout.program(), score=score_of(measured.contrast), readings=layout.readings
     )
-    return max(answer, wider, key=lambda one: explained_bits(evidence, one))
+    wider = dataclasses.replace(wider, worth=explained_bits(evidence, wider))
+    return max(answer, wider, key=lambda one: one.worth)

@@ -10,9 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from p3i.grammar.ast import Affine
 from p3i.interp.compile import compile
-from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.extent.layout import filling_layout, layout_at, refitted
@@ -59,12 +57,12 @@ def other_readings(session: Session, answer: Answer, *, most: int) -> list[Answe
 def _others(session: Session, answer: Answer) -> Iterator[Answer]:
     config = session.config
     evidence = session.evidence.under(answer.focal_mm or session.evidence.focal_mm)
-    ground = compile(answer.program).index
+    drawn = compile(answer.program)
     for reading in answer.readings:
         if reading.drawn:
             continue
-        lattice = _lattice(answer).moved_to(np.array(reading.steps))
-        layout = layout_at(evidence, lattice, ground, readings=_seen_from(reading, answer.readings))
+        lattice = Lattice.of(drawn, drawn.theta).moved_to(np.array(reading.steps))
+        layout = layout_at(evidence, lattice, drawn.index, readings=_seen_from(reading, answer.readings))
         if layout is None:
             continue
         layout = refitted(evidence, layout)
@@ -73,16 +71,6 @@ def _others(session: Session, answer: Answer) -> Iterator[Answer]:
         other = replace(answer, program=layout.program(), readings=layout.readings, notes=())
         score = score_of_program(evidence, other.program)
         yield replace(other, score=score, worth=explained_bits(session.evidence, other))
-
-
-def _lattice(answer: Answer) -> Lattice:
-    """The camera and the lattice that a lattice's program draws."""
-    parts = nest(answer.program)
-    x, y = parts.draw.x, parts.draw.y
-    assert isinstance(x, Affine) and isinstance(y, Affine)
-    basis = np.array([[x.i, y.i], [x.j, y.j]])
-    camera = answer.program.camera
-    return Lattice(camera.rx_deg, camera.ry_deg, basis, np.array([x.constant, y.constant]))
 
 
 def _seen_from(drawn: Reading, readings: tuple[Reading, ...]) -> tuple[Reading, ...]:

@@ -141,10 +141,8 @@ def _fitted(look: Session, guesses: Iterable[Guess], *, most: int) -> list[Fitte
                 continue
             look.tell("refining", 0.3 + 0.5 * fitted / most)
             fit = look.completed(partial(_fit, look, guess))
-            tried, fitted = (
-                tried + 1,
-                fitted + (fit is not None),
-            )  # what cannot be begun costs next to nothing
+            tried += 1
+            fitted += fit is not None  # what cannot be begun costs next to nothing
             if fit is None or not holds(fit, guess):
                 continue
             idle = 0 if all(worth(fit) > worth(other) for _, other in fits) else idle + 1

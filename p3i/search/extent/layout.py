@@ -69,8 +69,7 @@ def found_layout(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[
 
     @cache
     def cells(origin: tuple[float, float]) -> Cells | None:
-        at = np.array(origin)
-        return cells_that_hold(image.pixels, image.valid, matrix, lattice.basis, at, support, roi=image.roi)
+        return _cells(evidence, matrix, support, lattice.basis, np.array(origin))
 
     def held(phase: Phase) -> Cells | None:
         return cells((float(phase.origin[0]), float(phase.origin[1])))
@@ -128,16 +127,20 @@ def layout_at(
     evidence: Evidence, lattice: Lattice, ground: Tensor, *, readings: tuple[Reading, ...]
 ) -> Layout | None:
     """The objects of a lattice that lie at its points, one of the `readings`, around cells [N, 2]."""
-    image = evidence.part.image
-    matrix, support = _seen(evidence, lattice, ground)
-    cells = cells_that_hold(
-        image.pixels, image.valid, matrix, lattice.basis, lattice.origin, support, roi=image.roi
-    )
+    cells = _cells(evidence, *_seen(evidence, lattice, ground), lattice.basis, lattice.origin)
     found = None if cells is None else cells.outline()
     if found is None:
         return None
     layout = Layout(lattice, found.i_range, found.j_range, found.guards, readings)
     return None if _is_a_row(layout) else layout
+
+
+def _cells(
+    evidence: Evidence, matrix: np.ndarray, support: np.ndarray, basis: np.ndarray, origin: np.ndarray
+) -> Cells | None:
+    """The cells of a lattice in what is looked at: `cells_that_hold`."""
+    image = evidence.part.image
+    return cells_that_hold(image.pixels, image.valid, matrix, basis, origin, support, roi=image.roi)
 
 
 def _seen(evidence: Evidence, lattice: Lattice, ground: Tensor) -> tuple[np.ndarray, np.ndarray]:
@@ -210,9 +213,10 @@ def refitted(evidence: Evidence, layout: Layout) -> Layout:
     objects = objects_of(evidence, layout.program(from_zero=False))
     if objects is None or len(objects.index) < _FEWEST_REFITTED:
         return layout
-    pattern, drawn = lattice_filling().pattern, compile(settled(objects).program())
-    theta = Lattice.of(drawn, drawn.theta).theta(pattern)
-    return replace(layout, lattice=Lattice.of(pattern, theta)) if sane(pattern, theta) else layout
+    drawn = compile(settled(objects).program())
+    if not sane(drawn, drawn.theta):
+        return layout
+    return replace(layout, lattice=Lattice.of(drawn, drawn.theta))
 
 
 def _painted(evidence: Evidence, cells: Tensor, matrix: np.ndarray, lattice: Lattice) -> np.ndarray:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from p3i.search.extent.phase import WEIGHTS
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.unrolled import colours_at, gradients, polar_points
-from p3i.search.result import MOST_FALSE_ALARMS
+from p3i.search.result import NEEDED_BITS
 from p3i.vision.cells import median_cell
 from p3i.vision.motif import concentration, contrast, parts, symmetry
 
@@ -122,7 +122,7 @@ def _within_one_kind(sectors: Sectors, rows: slice) -> Mask:
         spread[column] = (colour / np.maximum(count, 1)).var(0).sum()
     spread += _UNTOLD * float(np.where(known, lab - lab.mean(1, keepdims=True), 0).var((0, 1)).sum()) + 1e-9
     lost = 0.5 * (lab.shape[1] // _SIDE - 1) * np.log2(spread.max() / spread)
-    return lost <= -math.log2(MOST_FALSE_ALARMS)
+    return lost <= NEEDED_BITS
 
 
 def _sectors(evidence: Evidence, ring: Ring) -> Sectors:

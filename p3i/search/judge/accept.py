@@ -17,7 +17,7 @@ from dataclasses import replace
 from p3i.search.answer import Answer
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.look.evidence import Evidence
-from p3i.search.result import MOST_FALSE_ALARMS
+from p3i.search.result import NEEDED_BITS
 
 
 def chosen_among(ways: int, answer: Answer) -> Answer:
@@ -38,7 +38,7 @@ def false_alarms(bits: float) -> float:
 
 def beyond_noise(bits: float) -> bool:
     """Whether a picture without a pattern would hardly ever show a find of these bits."""
-    return bits > -math.log2(MOST_FALSE_ALARMS)
+    return bits > NEEDED_BITS
 
 
 def with_printed_scores(

@@ -12,7 +12,6 @@ to be worth b bits by chance (Kraft's inequality, and Markov's). That is what ac
 What a person asked for (a sketch, a start, the paper's recipe) needs no bits.
 """
 
-import math
 from dataclasses import dataclass
 
 from p3i.interp.compile import compile
@@ -24,7 +23,7 @@ from p3i.search.forms.length import CAMERA_BITS, cost_bits
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import recurrence_bits
 from p3i.search.look.thinned import thinned
-from p3i.search.result import MOST_FALSE_ALARMS
+from p3i.search.result import NEEDED_BITS
 
 # More objects than this are judged by a part of them.
 _MOST_JUDGED = 200
@@ -63,4 +62,4 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
 
 def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:
     """What so many numbers of a camera are worth that save these bits: less their cost and noise's share."""
-    return saved - numbers * CAMERA_BITS + math.log2(MOST_FALSE_ALARMS)
+    return saved - numbers * CAMERA_BITS - NEEDED_BITS

@@ -48,10 +48,6 @@ class Session:
             self._generator = torch.Generator().manual_seed(self.config.seed)
         return self._generator
 
-    def elapsed(self) -> float:
-        """Seconds since the search of this photo began."""
-        return time.monotonic() - self._begun
-
     def go_on(self) -> bool:
         """Whether there is time left; once not, `stopped` says so."""
         limit = self.config.time_s

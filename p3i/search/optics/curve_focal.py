@@ -18,7 +18,7 @@ from p3i.search.look.evidence import Evidence
 _ROUNDS = 5
 
 
-def with_paid_focal(evidence: Evidence, fit: Fit, *, keep_side: bool = False) -> Fit:
+def with_paid_focal(evidence: Evidence, fit: Fit) -> Fit:
     """The fit with the focal that was assumed, where its own one does not pay for itself."""
     assumed = evidence.focal_mm
     if fit.focal_mm == assumed:
@@ -26,11 +26,10 @@ def with_paid_focal(evidence: Evidence, fit: Fit, *, keep_side: bool = False) ->
     values = values_of(fit)
     camera = Camera(values["camera.rx"], values["camera.ry"], fit.focal_mm).refocused(assumed)
     values |= {"camera.rx": camera.rx_deg, "camera.ry": camera.ry_deg}
-    side = fit.side if keep_side else None
-    start = measured(evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=assumed, side=side)
+    start = measured(evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=assumed)
     if start is None:
         return fit
-    kept = follow(evidence, start, rounds=_ROUNDS, keep_side=keep_side)
+    kept = follow(evidence, start, rounds=_ROUNDS)
     objects = objects_of(evidence, fit.program(), focal_mm=fit.focal_mm)
     if objects is None:
         return fit
