@@ -13,15 +13,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from p3i.interp.compile import compile
+from p3i.search.anew import drawn_anew
 from p3i.search.answer import Answer
-from p3i.search.extent.layout import found_layout, layout_fit, refitted
 from p3i.search.forms.asked import asks_for_itself
-from p3i.search.forms.lattice import Lattice
 from p3i.search.judge.accept import beyond_noise, chosen_among
-from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.region import region_px
-from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.part import Box
 from p3i.search.look.session import Session
@@ -62,7 +58,7 @@ def looked_closer(session: Session, search: Search) -> tuple[Session, list[Answe
     around = _with_surroundings(session.evidence, found[0], box)
     closer = _through(session, around)
     if around != box:
-        found = [_seen_whole(closer, answer) for answer in found]
+        found = [drawn_anew(closer.evidence, answer) for answer in found]
     place = f"{around.width} x {around.height} pixels from ({around.left}, {around.top}) on"
     note = f"found by a closer look at {place}"
     told = [dataclasses.replace(answer, notes=(*answer.notes, note)) for answer in found]
@@ -116,24 +112,3 @@ def _with_surroundings(evidence: Evidence, answer: Answer, box: Box) -> Box:
         min(int(right), math.ceil(x1 + across)) if x1 >= box.right - 1 else box.right,
         min(int(bottom), math.ceil(y1 + down)) if y1 >= box.bottom - 1 else box.bottom,
     )
-
-
-def _seen_whole(session: Session, answer: Answer) -> Answer:
-    """The answer, worth what it explains of the session's part of the photo, with the objects that it has
-    there if that says more."""
-    evidence, drawn = session.evidence, compile(answer.program)
-    answer = dataclasses.replace(answer, worth=explained_bits(evidence, answer))
-    found = None
-    if answer.worth > 0:
-        found = found_layout(evidence, Lattice.of(drawn, drawn.theta), drawn.index.double())
-    if found is None:
-        return answer
-    layout = refitted(evidence, found[0])
-    measured = layout_fit(evidence, layout)
-    if measured is None:
-        return answer
-    wider = dataclasses.replace(
-        answer, program=layout.program(), score=score_of(measured.contrast), readings=layout.readings
-    )
-    wider = dataclasses.replace(wider, worth=explained_bits(evidence, wider))
-    return max(answer, wider, key=lambda one: one.worth)

@@ -9,7 +9,7 @@ import numpy as np
 
 from p3i.grammar.ast import Program
 from p3i.grammar.printer import format_program
-from p3i.interp.compile import compile
+from p3i.search.anew import drawn_anew
 from p3i.search.answer import Answer
 from p3i.search.closer import looked_closer
 from p3i.search.config import SearchConfig
@@ -18,13 +18,11 @@ from p3i.search.extent.layout import proposed, supported
 from p3i.search.fit.best import Best
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.fitting import certain, fit_places, holds, worth
-from p3i.search.fit.grow import measure, side_of_cell
 from p3i.search.fit.same import same_lattice, says_already
+from p3i.search.fit.saved import saved_bits
 from p3i.search.forms.asked import asks_for_itself, check_asked
 from p3i.search.forms.guess import Guess
-from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.sketches import Sketched, sketches
-from p3i.search.forms.spelled import lattice_filling
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.judge.answered import answers_of
 from p3i.search.judge.elsewhere import with_others
@@ -77,7 +75,7 @@ def synthesize(
         else:
             answers = _answers(look)
             if config.lens == "auto" and not asks_for_itself(config):
-                answers = with_lens(look, answers, _finished_anew)
+                answers = with_lens(look, answers, drawn_anew)
         result = look.completed(lambda: outcome(look, answers, assumed=assumed))
         closer = looked_closer(look, _answers) if result.program is None else None
         if closer is None:
@@ -190,20 +188,13 @@ def _answers(look: Session) -> list[Answer]:
 
 
 def _finished(look: Session, fit: Fit) -> Answer | None:
-    """A lattice that was fitted, as an answer."""
+    """A lattice that was fitted, as an answer; None where not even the cells that agree come again."""
+    agreeing = replace(fit, index=fit.index[fit.support], contrast=fit.contrast[fit.support])
+    if saved_bits(look.evidence, agreeing) <= 0:
+        return None
     sketch = sketches(SearchConfig(structure="lattice"))[0]
     found = drawn(look, sketch, fit, None)
     return None if found is None else answers_of(look, sketch, found)[0]
-
-
-def _finished_anew(look: Session, answer: Answer) -> Answer | None:
-    """A lattice finished once more from where it is, on other evidence: as far as it goes there."""
-    program = compile(answer.program)
-    pattern = lattice_filling().pattern
-    theta = Lattice.of(program, program.theta).theta(pattern)
-    level = look.evidence.level_for(side_of_cell(look.evidence, pattern, theta), finest=True)
-    fit = measure(level, pattern, theta, start=program.index.double())
-    return None if fit is None or not bool(fit.support.any()) else _finished(look, fit)
 
 
 def _in_text(trace: Trace) -> Trace:

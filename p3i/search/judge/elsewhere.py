@@ -24,9 +24,7 @@ from p3i.search.result import Other
 
 # A fit lies elsewhere where most of its cells do: at most this share of them lies in an answer's region.
 _MOST_INSIDE = 0.5
-# Fits that explain this much of the photo are worth working out for a note ...
-_LEAST_SCORE = 0.02
-# ... and planes whose normals differ by more than this are two.
+# Planes whose normals differ by more than this are two.
 _OTHER_PLANE_DEG = 8.0
 
 Finish = Callable[[Session, Fit], Answer | None]
@@ -54,7 +52,7 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     for other in answers[1:]:
         keep(other)
     for fit in fits:
-        if fit.covered < _LEAST_SCORE or not session.go_on():
+        if not session.go_on():
             break
         if not elsewhere(_cells_px(evidence, fit)):
             continue

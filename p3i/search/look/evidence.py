@@ -187,7 +187,8 @@ class Evidence:
         """The map on which cells of `cell_px` photo pixels a side are compared best."""
         scale = min(1.0, COARSE / self.part.size.longer)
         longer = FINE if finest or cell_px * scale < _LEAST_COARSE_CELL else COARSE
-        cell = cell_px * min(1.0, longer / self.part.size.longer)
+        # No cell of a pattern is as large as the map, but one that runs to the horizon.
+        cell = min(cell_px * min(1.0, longer / self.part.size.longer), longer)
         return self.level(longer, blur=_BLUR_SHARE * cell, name=name)
 
 

@@ -19,6 +19,7 @@ from p3i.search.fit.places import follow, measured
 from p3i.search.fit.settle import Objects, Settled, objects_of, saved_bits, settled
 from p3i.search.forms.whole import scaled, whole_filling
 from p3i.search.judge.bits import explained_bits, worth_of_numbers
+from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.look.straight import Straightened, straightened
 from p3i.search.optics.tilt import tells_focal
@@ -30,7 +31,7 @@ _K1_DIGITS = 4
 _LEAST_TOLD_PX = 1.0
 
 Search = Callable[[Session], list[Answer]]
-Finish = Callable[[Session, Answer], Answer | None]
+Finish = Callable[[Evidence, Answer], Answer]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,8 +82,9 @@ def lens_told(objects: Objects, *, free_focal: bool = False) -> LensTold:
 def with_lens(session: Session, answers: list[Answer], finish: Finish) -> list[Answer]:
     """The answers, the best of them finished under the lens that its objects tell, if they tell one.
 
-    `finish` works out a lattice from where it is; it is given a session and an answer on the straightened
-    photo. What is not flat is told of in a note. A search that was cut short looks for no lens.
+    `finish` draws a lattice anew; it is given the straightened photo, and an answer on it, and returns one
+    that is worth what it explains there. What is not flat is told of in a note. A search that was cut short
+    looks for no lens.
     """
     if not answers or session.stopped is not None:
         return answers
@@ -119,19 +121,17 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
         focal_mm = math.exp(fit.number("focal")) if free_focal else answer.focal_mm
         start = _on_photo(seen, dataclasses.replace(best, program=fit.program(), focal_mm=focal_mm))
         seen = straightened(evidence.image, now)
-        again = dataclasses.replace(session, evidence=seen.looked_at(evidence))
-        start = _on_canvas(seen, start)
-        found = finish(again, start) if answer.structure == "lattice" else _followed(again, start)
-        session.stopped = again.stopped
+        straight, start = seen.looked_at(evidence), _on_canvas(seen, start)
+        found = finish(straight, start) if answer.structure == "lattice" else _followed(straight, start)
         if found is None:
             return answer
-        worth = answer.worth + explained_bits(again.evidence, found) - before + told.worth
+        worth = answer.worth + found.worth - before + told.worth
         best = dataclasses.replace(found, worth=worth, notes=answer.notes)
-        objects = objects_of(again.evidence, best.program, focal_mm=best.focal_mm, seen=seen)
+        objects = objects_of(straight, best.program, focal_mm=best.focal_mm, seen=seen)
         if objects is None:
             return answer
         told = lens_told(objects, free_focal=free_focal)
-        if abs(told.k1 - now) <= told.fit.sigma("lens") or session.stopped is not None:
+        if abs(told.k1 - now) <= told.fit.sigma("lens"):
             break
     if best.worth < answer.worth or told.worth <= 0:
         return answer
@@ -140,17 +140,17 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
     return _noted(dataclasses.replace(_on_photo(seen, best), notes=(*answer.notes, note)), told)
 
 
-def _followed(session: Session, answer: Answer) -> Answer | None:
-    """A ring or hybrid on a straightened photo, fitted from where it is."""
+def _followed(evidence: Evidence, answer: Answer) -> Answer | None:
+    """A ring or hybrid on a straightened photo, fitted from where it is, and worth what it explains there."""
     whole = whole_filling(answer.program)
     assert whole is not None
-    focal_mm = answer.focal_mm or session.evidence.focal_mm
-    start = measured(session.evidence, *whole, focal_mm=focal_mm)
+    start = measured(evidence, *whole, focal_mm=answer.focal_mm or evidence.focal_mm)
     if start is None:
         return None
-    fit = follow(session.evidence, start, rounds=3, free_focal=tells_focal(answer))
+    fit = follow(evidence, start, rounds=3, free_focal=tells_focal(answer))
     focal_mm = fit.focal_mm if answer.focal_mm is not None else None
-    return dataclasses.replace(answer, program=fit.filling.program(fit.z, ()), focal_mm=focal_mm)
+    answer = dataclasses.replace(answer, program=fit.filling.program(fit.z, ()), focal_mm=focal_mm)
+    return dataclasses.replace(answer, worth=explained_bits(evidence, answer))
 
 
 def _noted(answer: Answer, told: LensTold) -> Answer:

@@ -1,0 +1,33 @@
+"""A lattice that was found, drawn once more where more of it, or it more clearly, is seen."""
+
+from dataclasses import replace
+
+from p3i.interp.compile import compile
+from p3i.search.answer import Answer
+from p3i.search.extent.layout import found_layout, layout_fit, refitted
+from p3i.search.forms.lattice import Lattice
+from p3i.search.judge.bits import explained_bits
+from p3i.search.look.contrast import score_of
+from p3i.search.look.evidence import Evidence
+
+
+def drawn_anew(evidence: Evidence, answer: Answer) -> Answer:
+    """A lattice's answer, worth what it explains of what `evidence` looks at, with the objects that it has
+    there if that says more.
+    """
+    drawn = compile(answer.program)
+    answer = replace(answer, worth=explained_bits(evidence, answer))
+    found = None
+    if answer.worth > 0:
+        found = found_layout(evidence, Lattice.of(drawn, drawn.theta), drawn.index.double())
+    if found is None:
+        return answer
+    layout = refitted(evidence, found[0])
+    measured = layout_fit(evidence, layout)
+    if measured is None:
+        return answer
+    wider = replace(
+        answer, program=layout.program(), score=score_of(measured.contrast), readings=layout.readings
+    )
+    wider = replace(wider, worth=explained_bits(evidence, wider))
+    return max(answer, wider, key=lambda one: one.worth)
