@@ -23,6 +23,7 @@ from p3i.search.fit.saved import saved_bits
 from p3i.search.forms.asked import asks_for_itself, check_asked
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.sketches import Sketched, sketches
+from p3i.search.forms.spelled import lattice_filling
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.judge.answered import answers_of
 from p3i.search.judge.elsewhere import with_others
@@ -184,7 +185,8 @@ def _answers(look: Session) -> list[Answer]:
     answers = sorted(best.asked(), key=lambda answer: -answer.worth)
     if asks_for_itself(look.config):
         return answers
-    return look.completed(lambda: with_others(look, best.fits, answers, finish=_finished))
+    lattices = [fit for fit in best.fits if fit.filling is lattice_filling()]
+    return look.completed(lambda: with_others(look, lattices, answers, finish=_finished))
 
 
 def _finished(look: Session, fit: Fit) -> Answer | None:
