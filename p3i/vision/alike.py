@@ -88,26 +88,37 @@ def alike_in(sheet: Sheet, likely: Floats | None = None) -> Alike | None:
     cells, cells_known = cut(features, side), cut(known, side)
     middle = repeats[side // 2 :: side, side // 2 :: side].ravel()
     weights = np.clip(middle - 0.05, 0, 1).astype(np.float32) ** 2
-    if likely is not None:
-        weights *= 0.1 + 0.9 * likely
-    template, fit, weights, level = _agreed_cell(cells, cells_known, weights)
+    where = np.ones(len(cells), np.float32) if likely is None else likely
+    grid = (box.rows, box.columns)
+    template, fit, weights, level = _agreed_cell(cells, cells_known, weights, where.reshape(grid))
     second = _second_kind(cells, cells_known, weights, fit / max(level, 1e-6), (box.rows, box.columns))
     return Alike(sheet, features, known, cells, cells_known, template, weights, level, second, colour_share)
 
 
-def _agreed_cell(cells: Floats, known: Mask, weights: Floats) -> tuple[Floats, Floats, Floats, float]:
-    """Mean cell and weights that explain each other: template, fit, weights, level; cells [N, C, n, n]."""
+def _agreed_cell(
+    cells: Floats, known: Mask, weights: Floats, where: Floats
+) -> tuple[Floats, Floats, Floats, float]:
+    """Mean cell and weights that explain each other: template, fit, weights, level; cells [N, C, n, n].
+
+    The mean is of the cells `where` [rows, columns] the pattern is thought to be, in 0..1, and of what grows
+    from there, next to next: elsewhere much may repeat that is another pattern, or a smooth ground's noise.
+    """
     visible = known.mean(axis=(1, 2), dtype=np.float32)
     shown = visible > 0.3
     weights = weights * shown
-    template, fit, level = weighted_mean(cells, known, weights), np.zeros(len(cells), np.float32), 0.0
+    fit, level = np.zeros(len(cells), np.float32), 0.0
+    trust = (0.1 + 0.9 * where).ravel()
+    template = weighted_mean(cells, known, weights * trust)
     for _ in range(_ROUNDS):
         fit = agreement(cells, known, template[None])[:, 0] * shown
-        level = float((weights * fit).sum() / max(float(weights.sum()), 1e-6))
+        sure = weights * trust
+        level = float((sure * fit).sum() / max(float(sure.sum()), 1e-6))
         if level <= 0:
             break
         weights = np.clip((fit / level - 0.4) / 0.6, 0, 1) * visible * shown
-        template = weighted_mean(cells, known, weights)
+        where = np.maximum(where, np.clip(2 * cv2.blur((weights * trust).reshape(where.shape), (3, 3)), 0, 1))
+        trust = (0.1 + 0.9 * where).ravel()
+        template = weighted_mean(cells, known, weights * trust)
     return template, fit, weights, level
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.forms.sketches import Sketched
+from p3i.search.result import NEEDED_BITS
 
 # Where the objects of a program agree so well, or it explains more than the rings and hybrids of photos do, a
 # pattern of another structure could not explain the photo better.
@@ -39,7 +40,7 @@ class Best:
         Hybrids hold rings, and say more than these, however sure they are.
         """
         return not any(
-            (answer.score > _BEYOND_DOUBT or answer.worth > _MOST_OF_CURVES)
+            answer.worth > (NEEDED_BITS if answer.score > _BEYOND_DOUBT else _MOST_OF_CURVES)
             and answer.structure != sketch.structure
             and not (sketch.structure == "hybrid" and answer.structure == "circular")
             for answer in self.asked()

@@ -85,3 +85,18 @@ def test_between_needs_two_on_each_side_along_a_row_or_a_column():
     result = between(passes)
     assert result[2].tolist() == [False, True, True, True, True, True, False]
     assert not np.delete(result, 2, axis=0).any()
+
+
+def test_a_small_pattern_keeps_its_cell_beside_much_that_repeats_as_well(draw_scene):
+    board = [(i, j) for i in range(3) for j in range(3)]
+    around = [(i, j) for i in range(9) for j in range(9) if i > 3 or j > 3]
+    one, other = draw_scene(board, radius=20), draw_scene(around, kind="crossing")
+    matrix = one.image_from_plane @ [*(one.origin + 3.5 * one.basis.sum(0)), 1]
+    across, down = (matrix[:2] / matrix[2]).round().astype(int)
+    pixels, support = other.pixels.copy(), np.zeros(one.valid.shape, np.float32)
+    pixels[:down, :across] = one.pixels[:down, :across]
+    support[:down, :across] = 1
+    alike = alike_of(one, pixels=pixels, support=support)
+    taken = cells_where(alike, alike.weights > 0.5)
+    assert len(taken & set(board)) >= 8
+    assert len(taken - set(board)) <= 2

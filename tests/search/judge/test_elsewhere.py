@@ -6,12 +6,19 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from drawn import DrawnRing
 from truth import SMALL, pose_error_deg, small_scene
 
 from p3i.evaluation.lattice_scenes import lattice_scene
 from p3i.interp.lens import photo_from_straight, straight_from_photo
+from p3i.search import synthesize as synthesize_module
 from p3i.search.config import SearchConfig
-from p3i.search.synthesize import synthesize
+from p3i.search.fit.places import measured, numbers_of
+from p3i.search.forms.spelled import ring_filling
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
+from p3i.search.result import NEEDED_BITS
+from p3i.search.synthesize import searched, synthesize
 from p3i.vision.image import Image
 from p3i.vision.warp import pixel_grid
 
@@ -75,3 +82,32 @@ def test_of_a_single_pattern_nothing_is_told() -> None:
     result = synthesize(small_scene(LEFT).image(), SearchConfig(structure="lattice"))
     assert result.program is not None
     assert not any("another" in note for note in result.notes)
+
+
+def test_a_ring_that_was_fitted_beside_the_answer_is_no_lattice_to_be_worked_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The ring's objects lie on the other half; what they mean as a lattice must not even be asked.
+    lattice, ring = small_scene(LEFT), DrawnRing(center=(28.0, 0.0), radius=12.0, size=4.0)
+    image = beside(lattice.pixels, (ring.image().pixels * 255).astype(np.uint8))
+    look = Session(Evidence(image, SearchConfig(), 35.0), SearchConfig())
+    found = searched(look)
+    fit = measured(look.evidence, ring_filling(12), _numbers_of(ring), focal_mm=35.0)
+    assert fit is not None and any(answer.worth > NEEDED_BITS for answer in found.asked())
+    found.fits.append(fit)
+    monkeypatch.setattr(synthesize_module, "searched", lambda _: found)
+    answers = synthesize_module._answers(look)
+    assert answers[0].structure == "lattice"
+
+
+def _numbers_of(ring: DrawnRing) -> torch.Tensor:
+    x, y = ring.center
+    values = {
+        "camera.rx": ring.rx_deg,
+        "camera.ry": ring.ry_deg,
+        "draw.x.radius.1": ring.radius,
+        "draw.x.angle.1": ring.first_deg,
+        "draw.x.offset.1": x,
+        "draw.y.offset.1": y,
+    }
+    return numbers_of(ring_filling(12), values)
