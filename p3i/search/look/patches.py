@@ -22,6 +22,7 @@ from p3i.search.look.cells import HALF_STEPS, Cells, Contrast, contrast_of
 from p3i.search.look.correlate import Instances, correlate, mean_of_others
 from p3i.search.look.evidence import ColourMap, Evidence
 from p3i.search.look.thinned import thinned
+from p3i.vision.oriented import double_angle
 from p3i.vision.warp import sample, sample_valid
 
 SIDE = 14
@@ -37,8 +38,6 @@ _MOST_DISTANCES = 2_000_000
 # An object's place is known to this share of a patch's side, and no better than this many pixels.
 _SHARE_NOISE = 0.03
 _PIXEL_NOISE = 0.3
-# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
-_FLOOR = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,10 +154,7 @@ def _features(lab: Tensor, known: Tensor) -> Tensor:
     """[N, 3, s + 2, s + 2] colours -> [N, 12, s, s] normalised features, 0 where not known [N, s, s]."""
     gx = 0.5 * (lab[:, :, 1:-1, 2:] - lab[:, :, 1:-1, :-2])
     gy = 0.5 * (lab[:, :, 2:, 1:-1] - lab[:, :, :-2, 1:-1])
-    squared = gx.square() + gy.square()
-    root = squared.sqrt().sqrt()
-    factor = root / (squared + _FLOOR**2)
-    gradient = torch.cat([root, (gx.square() - gy.square()) * factor, 2 * gx * gy * factor], 1)
+    gradient = torch.cat(double_angle(gx * gx, gy * gy, gx * gy), 1)
     return torch.cat([_normalised(gradient, known), _normalised(lab[:, :, 1:-1, 1:-1], known)], 1)
 
 

@@ -27,7 +27,7 @@ from torch import Tensor
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.unrolled import double_angle
+from p3i.search.look.unrolled import orientation
 from p3i.vision.warp import sample, sample_valid
 
 Floats = NDArray[np.float32]
@@ -154,7 +154,7 @@ def sectors_of(
     seen = known[..., whole]
     gradients, colours = (
         _without_mean(values, known)
-        for values in (np.stack(double_angle(gx, gy), 1), np.moveaxis(lab[:, 1:-1, 1:-1], -1, 1))
+        for values in (np.stack(orientation(gx, gy), 1), np.moveaxis(lab[:, 1:-1, 1:-1], -1, 1))
     )
     # [N, 6, ACROSS, ALONG], gradients and colours with the same weight.
     values = np.concatenate([_evened(gradients, seen), _evened(colours, seen)], 1)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.look.evidence import ColourMap, Evidence
+from p3i.vision.oriented import double_angle
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -32,8 +33,6 @@ _LEAST_ENERGY = 0.15
 _LEAST_KNOWN = 0.35
 # What is near a radius: up to this factor.
 _NEAR = 1.5
-# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
-_FLOOR = 0.4
 # At most so many readings of a strip are told.
 _MOST_ROWS = 4
 _ALL_COUNTS = range(_COUNTS[0], _COUNTS[1] + 1)
@@ -119,15 +118,10 @@ def colours_at(colours: ColourMap, at: Floats) -> Floats:
     return np.asarray(taken, np.float32)
 
 
-def double_angle(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """sqrt(|grad|), and that times the cosine and the sine of twice the direction, of all colours together.
-
-    Shapes: gx, gy [..., 3] -> three [...]; as vision/oriented.py has it for each colour.
-    """
-    squared = (gx * gx + gy * gy).sum(-1)
-    root = squared**0.25
-    factor = root / (squared + _FLOOR**2)
-    return root, (gx * gx - gy * gy).sum(-1) * factor, 2 * (gx * gy).sum(-1) * factor
+def orientation(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """The `double_angle` of all colours together: gx, gy [..., 3] -> three [...]."""
+    xx, yy, xy = ((one * other).sum(-1) for one, other in ((gx, gx), (gy, gy), (gx, gy)))
+    return double_angle(xx, yy, xy)
 
 
 def gradients(lab: NDArray) -> Floats:
@@ -137,7 +131,7 @@ def gradients(lab: NDArray) -> Floats:
     inner = smooth[:, 4:-4]
     gy = np.zeros_like(inner)
     gy[1:-1] = 0.5 * (inner[2:] - inner[:-2])
-    return np.stack(double_angle(gx, gy)).astype(np.float32)
+    return np.stack(orientation(gx, gy)).astype(np.float32)
 
 
 def _features(lab: NDArray, known: NDArray) -> tuple[Floats, NDArray[np.bool_]]:

@@ -38,15 +38,6 @@ _MOST_ELLIPSES = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CircleSeed:
-    """A circle that spots may lie on: its pose (degrees), and its centre in photo pixels."""
-
-    rx_deg: float
-    ry_deg: float
-    center_px: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Spots:
     """Spots of a map: places [N, 2], widths [N], and how their colour differs from the ground [N, 3]."""
 
@@ -55,26 +46,22 @@ class _Spots:
     colour: Array
 
 
-def circle_seeds(evidence: Evidence, generator: np.random.Generator) -> list[CircleSeed]:
-    """The circles through spots that look alike, the most telling first: two for each ellipse."""
+def circles(evidence: Evidence, generator: np.random.Generator) -> list[tuple[Camera, Array]]:
+    """The circles through spots that look alike, the most telling first: two for each ellipse.
+
+    Each is a camera that sees it straight on, and its centre in photo pixels.
+    """
     colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
-    lab = colours.lab
+    lab, map_from_photo = colours.lab, colours.map_from_photo.numpy()
     spots = _spots(lab, colours.valid.numpy())
     if len(spots.at) < _FEWEST:
         return []
-    photo_from_map = np.linalg.inv(colours.map_from_photo.numpy())
     size = evidence.image.size
     focal_px = Camera(focal_mm=evidence.focal_mm).focal_px(size)
     lens = np.array([[focal_px, 0, size.middle[0]], [0, focal_px, size.middle[1]], [0, 0, 1.0]])
-    found: list[CircleSeed] = []
-    for conic in _ellipses(spots, max(lab.shape[:2]), generator):
-        to_map = np.linalg.inv(photo_from_map)
-        on_photo = to_map.T @ conic @ to_map
-        found += [
-            CircleSeed(camera.rx_deg, camera.ry_deg, center)
-            for camera, center in _circles(on_photo, lens, evidence.focal_mm)
-        ]
-    return found
+    conics = _ellipses(spots, max(lab.shape[:2]), generator)
+    on_photo = [map_from_photo.T @ conic @ map_from_photo for conic in conics]
+    return [circle for conic in on_photo for circle in _circles(conic, lens, evidence.focal_mm)]
 
 
 def _spots(lab: NDArray, known: NDArray[np.bool_]) -> _Spots:
