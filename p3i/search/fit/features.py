@@ -17,8 +17,8 @@ from p3i.search.look.cells import sample_grid, sample_points
 from p3i.search.look.evidence import Level
 from p3i.vision.warp import sample, sample_valid
 
-# One step moves the camera by at most this many degrees, ...
-_MOST_TURN_DEG = 4.0
+MOST_TURN_DEG = 4.0
+"""One step moves the camera by at most so many degrees, ..."""
 # ... and any other number by at most this share of the pattern's step.
 _MOST_CHANGE = 0.08
 # A step this small against those limits ends the refinement.
@@ -57,7 +57,7 @@ def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = fro
         if path in fixed:
             continue
         if path.startswith("camera."):
-            limit = _MOST_TURN_DEG
+            limit = MOST_TURN_DEG
         else:
             variable = path.rsplit(".", 1)[1]
             # A constant may move as far as the loops' own steps.

@@ -42,8 +42,8 @@ Free = Literal["focal", "lens", "bend"]
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 150
 _FEWEST = 2
-# Each is looked for twice, the second time in so many samples along a side, by so many to each side.
-_CLOSER_SIDE, _CLOSER_REACH = 24, 8
+# Each is looked for twice, the second time in so many samples along a side.
+_CLOSER_SIDE = 24
 # Degrees of freedom of the noise. Of its scale it says (4 + 2) / (4 + 4) of what a Gaussian would.
 _TAIL = 4.0
 # The scale of residuals, in units of `whitening`: where to begin, and the least that is believed, which is a
@@ -213,9 +213,7 @@ def objects_of(
     certainty = found.certainty[there]
     # Once more where they were found, in finer samples.
     about = replace(where, origin=where.points(found.offsets[there][:, None])[:, 0])
-    closer = find_about(
-        evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE, reach=_CLOSER_REACH
-    )
+    closer = find_about(evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE)
     offsets = torch.where((closer.lead > 0)[:, None], closer.offsets, 0.0)
     places, _ = project(matrix, about.points(offsets[:, None])[:, 0])
     certainty = certainty.double()

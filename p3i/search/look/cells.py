@@ -72,12 +72,23 @@ def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
     return torch.einsum("nk,nkc->kc", weight, cells.values) / total.clamp(min=1e-6)[:, None], total
 
 
+def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
+    """For each of `own` [N, ...] the weighted mean of all others, by sample.
+
+    `known` says which samples count, in as many dimensions; `weights` [N]. Where no other is known, the mean
+    of all.
+    """
+    weight = known * weights.to(own).reshape(-1, *[1] * (own.dim() - 1))
+    total = weight.sum(0, keepdim=True)
+    mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
+    rest = total - weight
+    others = (mean * total - weight * own) / rest.clamp(min=1e-6)
+    return torch.where(rest > 1e-3, others, mean)
+
+
 def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:
     """Each cell's agreement with the weighted mean of all the others, [N]."""
-    mean, total = mean_cell(cells, weights)
-    own = cells.known * weights[:, None].to(cells.values)
-    rest = (total[None] - own).clamp(min=1e-6)[..., None]
-    others = (mean[None] * total[None, :, None] - own[..., None] * cells.values) / rest
+    others = mean_of_others(cells.values, cells.known[..., None], weights)
     return agreement(cells.values, others, cells.known)
 
 

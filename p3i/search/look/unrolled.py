@@ -22,11 +22,12 @@ _ANGLES = 288
 _STEP = 2 * math.pi / _ANGLES
 # Rows are this far apart in log radius; a bit coarser than the angles.
 _ROW_STEP = 0.035
-# Radii in hundredths of the longer side that is looked at: program units, where that is all of the photo.
-_RADII = (3.0, 75.0)
-_COUNTS = (4, 48)
-# The level of the photo that is unrolled: its longer side, about.
-_LONGER = 400
+RADII = (3.0, 75.0)
+"""Radii in hundredths of the longer side that is looked at: program units, where that is all of the photo."""
+COUNTS = (4, 48)
+"""The least and the most objects of a ring."""
+LONGER = 400
+"""Rings are looked for on the level of the photo that has about so many pixels on its longer side."""
 # A band of rows with less than this share of the mean energy holds nothing to compare.
 _LEAST_ENERGY = 0.15
 # Bands of which less than this share is in sight are no rings.
@@ -35,7 +36,7 @@ _LEAST_KNOWN = 0.35
 _NEAR = 1.5
 # At most so many readings of a strip are told.
 _MOST_ROWS = 4
-_ALL_COUNTS = range(_COUNTS[0], _COUNTS[1] + 1)
+_ALL_COUNTS = range(COUNTS[0], COUNTS[1] + 1)
 _PERIODS = _ANGLES / np.array(_ALL_COUNTS, float)
 # A band is as high as the step is wide, but no ring reaches further than from half to twice its radius.
 _HEIGHTS = np.clip(np.round(_PERIODS * _STEP / _ROW_STEP).astype(int), 3, 29) | 1
@@ -77,9 +78,9 @@ def unroll(
     `about` asks for the radii near this one only.
     """
     size, share = evidence.image.size, evidence.part.share
-    colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
+    colours = evidence.colours_for(evidence.part.size.longer / LONGER)
     matrix = colours.map_from_photo.numpy() @ image_from_plane(*pose, size=size, focal_mm=focal_mm).numpy()
-    low, high = (about / _NEAR, about * _NEAR) if about is not None else (r * share for r in _RADII)
+    low, high = (about / _NEAR, about * _NEAR) if about is not None else (r * share for r in RADII)
     radii = np.exp(np.arange(math.log(low), math.log(high), _ROW_STEP))
     angles = np.arange(_ANGLES, dtype=float) * _STEP
     at, known = polar_points(colours, matrix, center, radii, angles)

@@ -24,6 +24,7 @@ from p3i.search.look.cells import Cells, agreement, mean_cell
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import Frames, frames, read, sample_px
 from p3i.search.look.session import Session
+from p3i.search.look.unrolled import COUNTS, RADII
 from p3i.search.propose.views import gradient_view
 
 Floats = NDArray[np.float32]
@@ -37,15 +38,12 @@ _LEAST_QUALITY = 0.15
 # so many samples a side.
 _PATCHES = (0.7, 0.4)
 _SAMPLES = 8
-# Radii are tried in steps of this share of a patch, up to so many program units, on at most so many angles.
+# Radii are tried in steps of this share of a patch.
 _RADIUS_STEP = 0.15
-_MOST_RADIUS = 75.0
-_MOST_SLOTS = 48
 # An object is there where its agreement reaches this share of the ring's own objects'.
 _PRESENT = 0.55
 _LACKING = 0.7
 _MOST_RINGS = 6
-_MOST_FAN_COUNT = 16
 # An object where none should be counts this much of one.
 _STRAY = 0.5
 # Each ring holds at least this share of its objects, weighed by how plain they are.
@@ -55,7 +53,6 @@ _CANVAS = 256
 # Shifted rings agree with the first at least so much, absolutely and relative to the best of them.
 _LEAST_ALIKE = 0.25
 _ALIKE_SHARE = 0.6
-_MOST_PEAKS = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,11 +153,11 @@ def _around(evidence: Evidence, ring: _Ring, side: float) -> tuple[Array, Array]
     ring's phase + k steps. Each radius has the best of itself and its neighbours.
     """
     slots = round(360 / abs(ring.step_deg))
-    if slots > _MOST_SLOTS:
+    if slots > COUNTS[1]:
         return None
     fit, pattern = ring.fit, ring.fit.pattern
     own = frames(pattern, fit.theta, fit.index, side=side)
-    radii = np.arange(0.5 * side, _MOST_RADIUS * evidence.part.share, _RADIUS_STEP * side)
+    radii = np.arange(0.5 * side, RADII[1] * evidence.part.share, _RADIUS_STEP * side)
     angles = np.radians(ring.phase_deg + np.arange(2 * slots) * ring.step_deg / 2)
     r, angle = np.meshgrid(radii, angles, indexing="ij")
     out = np.stack([np.cos(angle), np.sin(angle)], -1).reshape(-1, 2)
@@ -272,7 +269,7 @@ def _fan(ring: _Ring, table: Array, radii: Array) -> Guess | None:
             if radius < -0.25 * growth:
                 break
             rows = [_row_of(radii, radius + i * growth) for i in range(1, _MOST_RINGS + 1)]
-            for count in range(2, min(_MOST_FAN_COUNT, slots // own) + 1):
+            for count in range(2, slots // own + 1):
                 most = min(_MOST_RINGS, slots // count)
                 worth = np.array(
                     [runs[row, :, count * i] if row is not None else np.full(slots, -np.inf)
@@ -340,7 +337,7 @@ def _along_lines(evidence: Evidence, ring: _Ring) -> Iterator[Guess]:
     shifts = np.stack([columns, rows], 1) - middle
     values = alike[rows, columns]
     far = np.hypot(*shifts.T) * unit > 0.8 * ring.radius
-    order = np.argsort(-values[far])[:_MOST_PEAKS]
+    order = np.argsort(-values[far])
     shifts, values = shifts[far][order], values[far][order]
     widened = cv2.dilate(alike, np.ones((2 * (apart // 2) + 1,) * 2))
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import Camera
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.unrolled import LONGER
 
 Array = NDArray[np.float64]
 
-# The map on which spots are looked for: its longer side, about; spots of these widths, in its pixels.
-_LONGER = 400
+# Spots of these widths are looked for, in pixels of the map.
 _WIDTHS = (2.0, 3.0, 4.5, 6.7, 10.0, 15.0)
 _MOST_SPOTS = 70
 # Alike are spots whose colours differ from their ground in the same direction, by this factor at most, and
@@ -51,7 +51,7 @@ def circles(evidence: Evidence, generator: np.random.Generator) -> list[tuple[Ca
 
     Each is a camera that sees it straight on, and its centre in photo pixels.
     """
-    colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
+    colours = evidence.colours_for(evidence.part.size.longer / LONGER)
     lab, map_from_photo = colours.lab, colours.map_from_photo.numpy()
     spots = _spots(lab, colours.valid.numpy())
     if len(spots.at) < _FEWEST:

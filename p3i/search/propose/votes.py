@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 # The canvas of a straightened view, in pixels a side, and of its padded transform.
 _CANVAS = 96
-_PADDED = 192
+_PADDED = 2 * _CANVAS
 _POSE_STEP_DEG = 15.0
 _MOST_TILT_DEG = 62.0
 # Turns that between them come close to a multiple of 360/n for every n from 5 on.
