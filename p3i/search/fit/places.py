@@ -43,7 +43,7 @@ def measured(
     if len(index) < _FEWEST:
         return None
     found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
-    return Fit(filling, z, focal_mm, side, index, found.contrast)
+    return Fit(filling, z, focal_mm, side, index, found)
 
 
 def registered(

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.fit.features import free_numbers
+from p3i.search.fit.features import step_limits
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.look.cells import sample_points
 from p3i.search.look.correlate import Instances
@@ -35,24 +35,19 @@ def fit_instances(
 
     Offsets are compared in index units, so that near and far objects count alike.
     """
-    free = free_numbers(pattern, theta)
     targets, _ = sample_points(level, pattern, theta, found.index + found.offsets)
     inverse, cell = _index_from_map(level, pattern, theta, found.index)
     noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()
 
-    def points_of(moving: Tensor) -> Tensor:
-        return sample_points(level, pattern, free.into(theta, moving), found.index)[0]
-
-    moved = robust_fit(
-        points_of,
-        free.of(theta),
+    return robust_fit(
+        lambda numbers: sample_points(level, pattern, numbers, found.index)[0],
+        theta,
         targets=targets,
         whiten=inverse / noise[:, None, None],
         weights=weights,
-        limits=torch.tensor(free.limits, dtype=torch.float64),
+        limits=step_limits(pattern, theta),
         iterations=iterations,
     )
-    return free.into(theta, moved)
 
 
 def robust_fit(
@@ -70,8 +65,8 @@ def robust_fit(
 
     `points_of` takes numbers [..., V] to points [..., N, 2], `start` [V] is where to begin, `targets` [N, 2],
     `whiten` [N, 2, 2] takes a difference of points to one in units of its noise, `weights` [N], `limits` [V]
-    is the most that a step may move each number. `prior` [V, 2], if given, holds a mean and a weight
-    (1 / variance) for each number.
+    is the most that a step may move each number, 0 where it is held. `prior` [V, 2], if given, holds a mean
+    and a weight (1 / variance) for each number.
     """
     moving = start
     for _ in range(iterations):

@@ -26,7 +26,7 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.interp.camera import FILM_MM, project, rotation
 from p3i.interp.lens import photo_from_straight
-from p3i.search.fit.features import step_limits
+from p3i.search.fit.features import moving_limits
 from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.forms.filling import Filling
@@ -238,7 +238,6 @@ def settled(objects: Objects, *free: Free) -> Settled:
     """The program's numbers, and those of the camera that are `free`, fitted to the objects' places."""
     starts: dict[Free, float] = {"focal": math.log(objects.focal_mm), "lens": objects.k1, "bend": 0.0}
     means: dict[Free, float] = {"focal": math.log(objects.expected_mm), "lens": 0.0, "bend": 0.0}
-    theta = objects.filling.theta(objects.numbers)
     more: list[Free] = [one for one in free for _ in range(_NUMBERS[one])]
     fit = fitted(
         lambda moving: objects.seen(moving, free),
@@ -246,7 +245,12 @@ def settled(objects: Objects, *free: Free) -> Settled:
         places=objects.places,
         whiten=objects.whiten,
         weights=objects.weights,
-        limits=torch.tensor([*step_limits(objects.filling, theta), *(_LIMITS[one] for one in more)]).double(),
+        limits=torch.cat(
+            [
+                moving_limits(objects.filling, objects.numbers),
+                torch.tensor([_LIMITS[one] for one in more]).double(),
+            ]
+        ),
         mean=torch.cat([objects.numbers, torch.tensor([means[one] for one in more]).double()]),
         known=torch.tensor([0.0] * len(objects.numbers) + [_SPREADS[one] ** -2 for one in more]).double(),
     )

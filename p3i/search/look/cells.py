@@ -54,6 +54,12 @@ def read_cells(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, gri
     return Cells(values.reshape(*shape, -1), known.reshape(shape))
 
 
+def members(index: Tensor, of: Tensor) -> Tensor:
+    """Which rows of `index` [N, 2] stand in `of` [M, 2], [N] bool."""
+    rows = {tuple(row) for row in of.tolist()}
+    return torch.tensor([tuple(row) in rows for row in index.tolist()], dtype=torch.bool)
+
+
 def agreement(a: Tensor, b: Tensor, known: Tensor) -> Tensor:
     """2 <a, b> / (|a|^2 + |b|^2) over the known samples: 1 equal, 0 unrelated; [..., K, C] -> [...].
 
@@ -92,18 +98,6 @@ def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:
     return agreement(cells.values, others, cells.known)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Contrast:
-    """How well each cell is predicted by the others, [N] each.
-
-    `agreement`: with the mean of all other cells. `contrast`: the same less the best that the mean reaches
-    half a step away; what a pattern has and a smooth or striped picture has not.
-    """
-
-    agreement: Tensor
-    contrast: Tensor
-
-
 def contrast(
     level: Level,
     pattern: Pattern,
@@ -112,34 +106,36 @@ def contrast(
     *,
     weights: Tensor,
     grid: Tensor,
-    half_steps: Tensor = HALF_STEPS,
     rounds: int = 2,
-) -> Contrast:
-    """Predict each cell from all others. `weights` [N] start the mean; then the contrast itself weighs."""
+) -> Tensor:
+    """How well each cell about `index` [N, 2] is predicted by the others, beyond half a step: `contrast_of`."""
     # All in one reading: what a cell costs is little, what a call costs is not.
-    steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), half_steps, -half_steps])
+    steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), HALF_STEPS, -HALF_STEPS])
     every = read_cells(level, pattern, theta, (index[None] + steps[:, None]).reshape(-1, 2), grid)
     values = every.values.reshape(len(steps), len(index), *every.values.shape[1:])
     known = every.known.reshape(len(steps), len(index), -1)
     return contrast_of(Cells(values, known), weights=weights, rounds=rounds)
 
 
-def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Contrast:
+def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Tensor:
     """The contrast [N] of cells that were read whole and at half steps.
+
+    It is each cell's agreement with the mean of all others, less the best that the mean reaches half a step
+    away: what a pattern has, and a smooth or striped picture has not.
 
     Shapes: cells.values [1 + 2 * M, N, K, C] and known [1 + 2 * M, N, K]: the whole cells, then those M half
     steps ahead, then those behind. `weights` [N] start the mean; then the contrast itself weighs.
     """
     values, known = cells.values, cells.known
     whole = Cells(values[0], known[0])
-    found = Contrast(torch.zeros(values.shape[1]), torch.zeros(values.shape[1]))
+    found = torch.zeros(values.shape[1])
     weights = weights.float()
     for _ in range(rounds):
         mean, _ = mean_cell(whole, weights)
         others = agreement_with_others(whole, weights)
         at_half = agreement(values[1:], mean, known[1:]).unflatten(0, (2, -1))
-        found = Contrast(others, others - at_half.mean(0).amax(0).clamp(min=0))
-        weights = found.contrast.clamp(min=0)
+        found = others - at_half.mean(0).amax(0).clamp(min=0)
+        weights = found.clamp(min=0)
         if float(weights.sum()) <= 0:
             break
     return found

@@ -18,7 +18,7 @@ from torch import Tensor
 
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
-from p3i.search.look.cells import HALF_STEPS, Cells, Contrast, contrast_of
+from p3i.search.look.cells import HALF_STEPS, Cells, contrast_of
 from p3i.search.look.correlate import Instances, located, reach_of
 from p3i.search.look.evidence import ColourMap, Evidence
 from p3i.search.look.thinned import thinned
@@ -183,8 +183,8 @@ def patch_contrast(
     side: float,
     focal_mm: Tensor | float,
     rounds: int = 3,
-) -> Contrast:
-    """How well each patch at `index` [N, 2] is predicted by the others, beyond half a step away: [N] each."""
+) -> Tensor:
+    """How well each patch at `index` [N, 2] is predicted by the others, beyond half a step away: [N]."""
     steps = half_steps(pattern)
     every = torch.cat([torch.zeros(1, 2, dtype=torch.float64), steps, -steps])
     where = frames(pattern, theta, (index[None] + every[:, None]).reshape(-1, 2), side=side)
