@@ -23,8 +23,8 @@ _MOST_CHANGE = 0.08
 _CONVERGED = 2e-3
 # Levenberg damping, relative to the diagonal.
 _DAMPING = 1e-3
-# Residuals beyond twice their median count less and less (a Cauchy weight).
-_ROBUST_SCALE = 2.0
+ROBUST_SCALE = 2.0
+"""Residuals beyond so many times what is typical of them count less and less (a Cauchy weight)."""
 
 
 def step_limits(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> Tensor:
@@ -107,7 +107,7 @@ def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor) -> 
     residual = values - _mean(values, weights)
     squared = residual.square().sum(-1)
     typical = squared[weights > 0].median() if bool((weights > 0).any()) else squared.new_ones(())
-    weights = weights / (1 + squared / (_ROBUST_SCALE**2 * typical + 1e-6))
+    weights = weights / (1 + squared / (ROBUST_SCALE**2 * typical + 1e-6))
     residual = values - _mean(values, weights)
     rows = torch.einsum("nkdc,nkdp->nkcp", slopes, jacobian)
     rows = rows - _mean(rows, weights)  # the mean cell moves along

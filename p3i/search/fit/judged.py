@@ -20,6 +20,7 @@ from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.config import FEWEST_OBJECTS, SearchConfig
+from p3i.search.fit.fitted import FEWEST_SEEN
 from p3i.search.forms.lattice import Lattice, cell_px, cells_in_view, in_shortest_steps
 from p3i.search.look.cells import HALF_STEPS, contrast, members, sample_grid, sample_points
 from p3i.search.look.evidence import Evidence, Level
@@ -37,7 +38,6 @@ from p3i.search.look.thinned import thinned
 MOST_JUDGED = 600
 """More objects than this are not needed to judge a program."""
 _ROUNDS = 4
-_FEWEST_PATCHES = 3
 # A cell as flat as a line is none.
 _LEAST_AREA = 1e-6
 # Cells looked for in a picture, of which MOST_JUDGED are read.
@@ -132,7 +132,7 @@ def judged_patches(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedPatch
     focal_mm = evidence.focal_mm
     for theta in _places(pattern):
         index = pattern.index[evidence.in_sight(pattern, theta)].double()
-        if len(index) < _FEWEST_PATCHES:
+        if len(index) < FEWEST_SEEN:
             continue
         index = index[thinned(index, MOST_JUDGED)]
         side = spacing(pattern, theta)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from p3i.interp.camera import project
 from p3i.search.fit.features import MOST_TURN_DEG
-from p3i.search.fit.fitted import Fit
+from p3i.search.fit.fitted import FEWEST_SEEN, Fit
 from p3i.search.fit.robust import robust_fit
 from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import score_of_curve
@@ -28,7 +28,6 @@ FOCAL_SPREAD = 0.35
 _MOST_SHIFT = 0.4
 MOST_ZOOM = 0.15
 """One step moves the focal's logarithm by at most this."""
-_FEWEST = 3
 
 
 def measured(
@@ -40,7 +39,7 @@ def measured(
     if side is None:
         side = spacing(pattern, theta)
     index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
-    if len(index) < _FEWEST:
+    if len(index) < FEWEST_SEEN:
         return None
     found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
     return Fit(filling, z, focal_mm, side, index, found)
@@ -59,7 +58,7 @@ def registered(
         evidence, pattern, fit.theta, fit.index, weights, side=fit.side, focal_mm=fit.focal_mm
     )
     certainty = found.certainty.double()
-    if int((certainty > 0).sum()) < _FEWEST:
+    if int((certainty > 0).sum()) < FEWEST_SEEN:
         return None
     size = evidence.image.size
     where = frames(pattern, fit.theta, fit.index, side=fit.side)

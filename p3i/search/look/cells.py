@@ -108,7 +108,7 @@ def contrast(
     grid: Tensor,
     rounds: int = 2,
 ) -> Tensor:
-    """How well each cell about `index` [N, 2] is predicted by the others, beyond half a step: `contrast_of`."""
+    """How well each cell about `index` [N, 2] is predicted by the others: `contrast_of`."""
     # All in one reading: what a cell costs is little, what a call costs is not.
     steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), HALF_STEPS, -HALF_STEPS])
     every = read_cells(level, pattern, theta, (index[None] + steps[:, None]).reshape(-1, 2), grid)

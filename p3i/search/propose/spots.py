@@ -19,11 +19,10 @@ Array = NDArray[np.float64]
 # Spots of these widths are looked for, in pixels of the map.
 _WIDTHS = (2.0, 3.0, 4.5, 6.7, 10.0, 15.0)
 _MOST_SPOTS = 70
-# Alike are spots whose colours differ from their ground in the same direction, by this factor at most, and
-# whose widths differ by that factor at most.
+# Alike are spots whose colours differ from their ground in the same direction, and by this factor at most,
+# as do their widths.
 _LEAST_COSINE = 0.85
 _MOST_STRONGER = 2.5
-_MOST_WIDER = 2.3
 # Each spot is tried with this many of the spots like it, in so many draws of five.
 _FELLOWS = 16
 _DRAWS = 150
@@ -101,7 +100,7 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
     cosine = (spots.colour @ spots.colour.T) / np.maximum(strength[:, None] * strength, 1e-9)
     stronger = np.maximum(strength[:, None] / strength, strength / strength[:, None])
     wider = np.maximum(spots.width[:, None] / spots.width, spots.width / spots.width[:, None])
-    alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_WIDER)
+    alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_STRONGER)
     # Strong spots tell more than weak ones, and many on one ellipse say little where there are many anyway.
     telling = np.sqrt(strength / max(float(strength.max()), 1e-9)) / np.sqrt(np.maximum(alike.sum(1), 1))
     best: list[tuple[float, Array, NDArray]] = []

@@ -24,6 +24,7 @@ from p3i.search.look.unrolled import Rows, best_rows, likeness, unroll
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.spots import circles
 from p3i.search.propose.views import even_weights, gradient_view
+from p3i.search.propose.windows import MOST_TILT_DEG
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -32,14 +33,12 @@ Array = NDArray[np.float64]
 _CANVAS = 96
 _PADDED = 2 * _CANVAS
 _POSE_STEP_DEG = 15.0
-_MOST_TILT_DEG = 62.0
 # Turns that between them come close to a multiple of 360/n for every n from 5 on.
 _TURNS_DEG = (36.0, 45.0, 51.4, 60.0, 72.0)
 # So many of the turns must agree: a ring of few objects answers to few.
 _AGREEING = 2
-# Peaks of the votes are this far apart, in canvas pixels, and at most so many are kept of each pose.
+# Peaks of the votes are this far apart, in canvas pixels.
 _APART = 9
-_MOST_OF_POSE = 8
 # An overlap of less than this share of the view's energy proves little.
 _LEAST_OVERLAP = 0.4
 # Centres closer than this share of the longer side are one.
@@ -77,7 +76,7 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
     colours = evidence.colours_for(part.size.longer / (2.5 * _CANVAS))
     map_from_photo = colours.map_from_photo.numpy()
     found: list[Vote] = []
-    for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, _MOST_TILT_DEG):
+    for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, MOST_TILT_DEG):
         seen = image_from_plane(rx_deg, ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm).numpy()
         view = gradient_view(colours, map_from_photo @ seen, side=_CANVAS)
         if view is None:
@@ -86,7 +85,7 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
         peaks = votes == cv2.dilate(votes, np.ones((_APART, _APART)))
         rows, columns = np.nonzero(peaks & (votes > 0))
         photo_from_view = np.linalg.inv(map_from_photo) @ view.map_from_view
-        for place in np.argsort(-votes[rows, columns])[:_MOST_OF_POSE]:
+        for place in range(len(rows)):
             at = photo_from_view @ [columns[place], rows[place], 1.0]
             center = at[:2] / at[2]
             if (np.abs(center - part.middle) < 0.53 * np.array([part.size.width, part.size.height])).all():
