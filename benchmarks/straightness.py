@@ -35,7 +35,8 @@ from p3i.evaluation.truth import read_truth
 from p3i.interp.lens import straight_from_photo
 from p3i.paint.straight.rectify import Rectified, rectify
 from p3i.place.placed import Placed
-from p3i.search.look.correlate import correlate, mean_of_others
+from p3i.search.look.cells import mean_of_others
+from p3i.search.look.correlate import correlate
 from p3i.vision.cells import sheet_features
 from p3i.vision.image import Image
 from p3i.vision.sheet import Box, cell_sides_px, cells_from_basis, project, straighten

@@ -1,6 +1,7 @@
 """Rings that are found already, for what starts from rings."""
 
 import pytest
+from drawn import DrawnRing
 
 from p3i.evaluation.scene import Scene
 from p3i.grammar.leaves import leaves
@@ -9,12 +10,25 @@ from p3i.search.config import SearchConfig
 from p3i.search.fit.best import Best
 from p3i.search.fit.fitted import Drawn
 from p3i.search.fit.places import curve_score, follow, measured, numbers_of
+from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
+from p3i.search.propose import proposers
 from p3i.search.propose.proposers import AROUND
 
 MOVING = ("draw.x.radius.1", "draw.x.offset.1", "draw.y.offset.1")
 FIXED = ("camera.rx", "camera.ry", "draw.x.angle.1", "draw.x.angle.j")
+
+
+def guess_of(ring: DrawnRing) -> Guess:
+    """The closed ring that this one lies on, but for its phase, as a proposer says it."""
+    filling = ring_filling(ring.slots)
+    return Guess(filling, ring.numbers(filling, a=-ring.first_deg), 1.0, focal_mm=ring.focal_mm)
+
+
+def proposes(patch: pytest.MonkeyPatch, *guesses: Guess) -> None:
+    """Searches for rings begin with these guesses."""
+    patch.setattr(proposers, "ring_guesses", lambda _: list(guesses))
 
 
 def found_ring(

@@ -1,8 +1,11 @@
 """`oriented`: gradient strength and direction of the Lab colours, without weights. The default feature."""
 
+from typing import Any, TypeVar
+
 import cv2
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from p3i.vision.fill import eroded, filled
 from p3i.vision.image import Image
@@ -17,13 +20,25 @@ _REACH = 4
 # to 1.0 the measure of docs/features.md hardly moves.)
 _FLOOR = 0.4
 
+Values = TypeVar("Values", NDArray[Any], torch.Tensor)
+
+
+def double_angle(xx: Values, yy: Values, xy: Values) -> tuple[Values, Values, Values]:
+    """sqrt(m), (gx^2 - gy^2) / m^1.5 and 2 gx gy / m^1.5 of gradients, m = |grad|: three of any one shape.
+
+    By gx^2, gy^2 and gx gy, of one plane or summed over several. The last two are sqrt(m) times the cosine
+    and sine of twice the direction: an orientation tensor, which does not tell black on white from white on
+    black.
+    """
+    squared = xx + yy
+    root = (squared**0.5) ** 0.5
+    # 1 / m^1.5 = sqrt(m) / m^2, with a floor under m^2 so that flat areas give 0, not 0/0.
+    factor = root / (squared + _FLOOR**2)
+    return root, (xx - yy) * factor, 2 * xy * factor
+
 
 def oriented(image: Image) -> RawFeatures:
-    """Nine channels, three for each of L, a, b: sqrt(m), (gx^2 - gy^2) / m^1.5, 2 gx gy / m^1.5, m = |grad|.
-
-    The last two are sqrt(m) times the cosine and sine of twice the direction: an orientation tensor, which
-    does not tell black on white from white on black. Known where everything within 4 pixels is.
-    """
+    """Nine channels, three for each of L, a, b: `double_angle`. Known where everything within 4 pixels is."""
     lab = lab_of(filled(image.pixels, image.valid))
     smooth = cv2.GaussianBlur(lab, (7, 7), _SIGMA, borderType=cv2.BORDER_REPLICATE)
     planes = np.empty((9, *image.valid.shape), np.float32)
@@ -31,12 +46,5 @@ def oriented(image: Image) -> RawFeatures:
         plane = np.ascontiguousarray(smooth[:, :, channel])
         gx = cv2.Sobel(plane, cv2.CV_32F, 1, 0, ksize=1, scale=0.5, borderType=cv2.BORDER_REPLICATE)
         gy = cv2.Sobel(plane, cv2.CV_32F, 0, 1, ksize=1, scale=0.5, borderType=cv2.BORDER_REPLICATE)
-        xx, yy = gx * gx, gy * gy
-        m = np.sqrt(xx + yy)
-        root = np.sqrt(m)
-        # 1 / m^1.5 = sqrt(m) / m^2, with a floor under m^2 so that flat areas give 0, not 0/0.
-        factor = root / (xx + yy + _FLOOR**2)
-        planes[3 * channel] = root
-        np.multiply(xx - yy, factor, out=planes[3 * channel + 1])
-        np.multiply(gx * gy, 2 * factor, out=planes[3 * channel + 2])
+        planes[3 * channel : 3 * channel + 3] = double_angle(gx * gx, gy * gy, gx * gy)
     return RawFeatures(torch.from_numpy(planes), torch.from_numpy(eroded(image.valid, _REACH)), 1.0)

@@ -2,13 +2,13 @@
 
 import importlib
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
-import numpy as np
 import pytest
 from drawn import DrawnRing
-from ringed import found_on, searches_around
+from ringed import found_on, guess_of, proposes, searches_around
 from truth import pose_error_deg, small_scene
 
 import p3i
@@ -21,8 +21,7 @@ from p3i.search.fit.fitted import Drawn
 from p3i.search.forms.sketches import by_hand
 from p3i.search.look.session import Session
 from p3i.search.optics import lens as lens_module
-from p3i.search.propose import climb, holes, paper, rings
-from p3i.search.propose.votes import RingProposal
+from p3i.search.propose import climb, holes, paper, proposers
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.search.synthesize import synthesize
 from p3i.size import Size
@@ -61,12 +60,10 @@ def lattice(patch: pytest.MonkeyPatch) -> Callable[..., SynthesisResult]:
 
 
 def ring(patch: pytest.MonkeyPatch) -> Callable[..., SynthesisResult]:
-    """Two proposals close to the ring."""
-    near = [
-        RingProposal(RING.rx_deg + off, RING.ry_deg, 35.0, np.array(RING.center) + off / 3, 24.0, 12, 1.0)
-        for off in (1.0, -1.0)
-    ]
-    patch.setattr(rings, "ring_proposals", lambda *_, **__: near)
+    """Two guesses close to the ring."""
+    x, y = RING.center
+    near = [replace(RING, rx_deg=RING.rx_deg + off, center=(x + off / 3, y + off / 3)) for off in (1.0, -1.0)]
+    proposes(patch, *map(guess_of, near))
     config = SearchConfig(structure="circular", focal_mm=35.0)
     return lambda **told: synthesize(RING.image(), config, **told)
 
@@ -241,6 +238,6 @@ def test_an_interrupt_while_the_lens_is_estimated_keeps_what_the_photo_showed(
 
 def test_once_interrupted_no_further_kind_of_pattern_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     image = DrawnRing(canvas=Size(224, 168)).image()
-    monkeypatch.setattr(rings, "ring_proposals", lambda *_, **__: pytest.fail("searched on"))
+    monkeypatch.setattr(proposers, "ring_guesses", lambda _: pytest.fail("searched on"))
     result = synthesize(image, SearchConfig(), progress=Said("straightening", 1))
     assert (result.program, result.stop) == (None, StopReason.INTERRUPTED)

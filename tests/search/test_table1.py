@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn import DrawnRing
 from found import finds
-from ringed import found_on, searches_around
+from ringed import found_on, guess_of, proposes, searches_around
 from truth import small_scene
 
 import p3i
@@ -17,8 +17,6 @@ from p3i.grammar.printer import format_program
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.propose import rings
-from p3i.search.propose.votes import RingProposal
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.search.synthesize import synthesize
 
@@ -37,14 +35,15 @@ def is_in_table1(result: SynthesisResult) -> None:
         assert parse(text, strict=True) == candidate.program
 
 
-def near(ring: DrawnRing) -> RingProposal:
-    pose = ring.rx_deg + 1, ring.ry_deg - 1
-    return RingProposal(*pose, 35.0, np.array(ring.center) + 0.3, 1.02 * ring.radius, ring.slots, 1.0)
+def near(ring: DrawnRing) -> DrawnRing:
+    x, y = ring.center
+    rx_deg, ry_deg, radius = ring.rx_deg + 1, ring.ry_deg - 1, 1.02 * ring.radius
+    return replace(ring, rx_deg=rx_deg, ry_deg=ry_deg, center=(x + 0.3, y + 0.3), radius=radius)
 
 
 def found(ring: DrawnRing, monkeypatch: pytest.MonkeyPatch, *, strict: bool) -> SynthesisResult:
     """The answer on a drawn ring, from a proposal close to it: what proposes is tested elsewhere."""
-    monkeypatch.setattr(rings, "ring_proposals", lambda *_, **__: [near(ring)])
+    proposes(monkeypatch, guess_of(near(ring)))
     return synthesize(ring.image(), SearchConfig(structure="circular", focal_mm=35.0, strict=strict, top=3))
 
 

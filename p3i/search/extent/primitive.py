@@ -224,4 +224,4 @@ def _contrast(evidence: Evidence, pattern: Pattern, ground: _Ground) -> float:
     level = evidence.level_for(side_of_cell(evidence, pattern, ground.theta))
     weights = torch.ones(len(some))
     found = contrast(level, pattern, ground.theta, some, weights=weights, grid=sample_grid())
-    return float(found.contrast.clamp(min=0).mean())
+    return float(found.clamp(min=0).mean())

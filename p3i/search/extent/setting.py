@@ -104,7 +104,7 @@ def _gains(look: Session, wide: Filling, z: Tensor, *, side: float, typical: flo
         at = at[thinned(wide.pattern.index[at], _MOST_WEIGHED)]
         index = wide.pattern.index[at].double()
         found = patch_contrast(evidence, wide.pattern, theta, index, side=side, focal_mm=evidence.focal_mm)
-        gains[at] = found.contrast.double() - _PRESENT * typical
+        gains[at] = found.double() - _PRESENT * typical
     return gains
 
 

@@ -12,9 +12,8 @@ from p3i.search.look.session import Session
 _PRESENT = 0.4
 # A ring is closed where at most this share of it lacks in one piece.
 _MOST_LACKING = 0.2
-# Growth looks this many places beyond an arc's ends, and goes on for so many rounds.
+# Growth looks this many places beyond an arc's ends.
 _REACH = 3
-_MOST_GROWTHS = 8
 
 
 def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
@@ -34,7 +33,7 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
     arc = fitted(look, filling, values, focal_mm=fit.focal_mm, rounds=2)
     if arc is None:
         return fit
-    for _ in range(_MOST_GROWTHS):
+    while True:  # each turn takes in one object more, at least, and a circle holds no more than its slots
         values, drawn = values_of(arc), len(arc.pattern.index)
         step = values["draw.x.angle.j"]
         slots = round(360 / abs(step))
@@ -57,7 +56,6 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
         if grown is None or grown.quality < 0.5 * arc.quality:
             return arc
         arc = grown
-    return arc
 
 
 def _best_run(fit: Fit, *, closed: bool = True) -> tuple[int, int]:

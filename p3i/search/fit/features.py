@@ -5,8 +5,6 @@ comparing all pairs: the pairs that lie far apart are what makes the pose precis
 the numbers comes from the compiled generator, so any sketch refines the same way.
 """
 
-from dataclasses import dataclass
-
 import torch
 from torch import Tensor
 
@@ -17,62 +15,44 @@ from p3i.search.look.cells import sample_grid, sample_points
 from p3i.search.look.evidence import Level
 from p3i.vision.warp import sample, sample_valid
 
-# One step moves the camera by at most this many degrees, ...
-_MOST_TURN_DEG = 4.0
+MOST_TURN_DEG = 4.0
+"""One step moves the camera by at most so many degrees, ..."""
 # ... and any other number by at most this share of the pattern's step.
 _MOST_CHANGE = 0.08
 # A step this small against those limits ends the refinement.
 _CONVERGED = 2e-3
 # Levenberg damping, relative to the diagonal.
 _DAMPING = 1e-3
-# Residuals beyond twice their median count less and less (a Cauchy weight).
-_ROBUST_SCALE = 2.0
+ROBUST_SCALE = 2.0
+"""Residuals beyond so many times what is typical of them count less and less (a Cauchy weight)."""
 
 
-@dataclass(frozen=True, slots=True)
-class FreeNumbers:
-    """Which numbers of theta a refinement may move: their places, and the scale of each one's step."""
+def step_limits(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> Tensor:
+    """The most that one step may move each number of theta [P]: [P], 0 for the fixed ones.
 
-    places: tuple[int, ...]
-    limits: tuple[float, ...]
-
-    def of(self, theta: Tensor) -> Tensor:
-        """The free numbers of theta [P]: [V]."""
-        return theta[list(self.places)]
-
-    def into(self, theta: Tensor, moving: Tensor) -> Tensor:
-        """theta [P] with these numbers [..., V] in the free places: [..., P]."""
-        selector = torch.eye(len(theta), dtype=theta.dtype)[list(self.places)]
-        return theta + (moving - self.of(theta)) @ selector
-
-
-def free_numbers(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> FreeNumbers:
-    """All numbers of theta [P] but the fixed ones, each with the most that one step may move it.
-
-    Zeros that scale a loop variable are free too: the limit comes from the largest number of their kind.
+    Zeros that scale a loop variable may move too: the limit comes from the largest number of their kind.
     """
-    places, limits = [], []
     values = dict(zip(pattern.paths, theta.tolist(), strict=True))
-    for place, path in enumerate(pattern.paths):
+
+    def limit(path: str) -> float:
         if path in fixed:
-            continue
+            return 0.0
         if path.startswith("camera."):
-            limit = _MOST_TURN_DEG
-        else:
-            variable = path.rsplit(".", 1)[1]
-            # A constant may move as far as the loops' own steps.
-            alike = ("i", "j") if variable == "1" else (variable,)
-            steps = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] in alike]
-            limit = _MOST_CHANGE * max(*steps, 1e-3)
-        places.append(place)
-        limits.append(limit)
-    return FreeNumbers(tuple(places), tuple(limits))
+            return MOST_TURN_DEG
+        variable = path.rsplit(".", 1)[1]
+        # A constant may move as far as the loops' own steps.
+        alike = ("i", "j") if variable == "1" else (variable,)
+        steps = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] in alike]
+        return _MOST_CHANGE * max(*steps, 1e-3)
+
+    return torch.tensor([limit(path) for path in pattern.paths], dtype=torch.float64)
 
 
-def step_limits(filling: Filling, theta: Tensor) -> list[float]:
-    """The most that one step may move each moving number of a filling, [F]: `free_numbers` at theta [P]."""
-    limits = dict(zip(filling.pattern.paths, free_numbers(filling.pattern, theta).limits, strict=True))
-    return [limits[unknown.name] for unknown in filling.moving]
+def moving_limits(filling: Filling, z: Tensor) -> Tensor:
+    """The most that one step may move each number of a filling, z [F]: [F], as `step_limits`."""
+    limits = step_limits(filling.pattern, filling.theta(z)).tolist()
+    named = dict(zip(filling.pattern.paths, limits, strict=True))
+    return torch.tensor([named[unknown.name] for unknown in filling.moving], dtype=torch.float64)
 
 
 def refine(
@@ -92,15 +72,14 @@ def refine(
     """
     grid = sample_grid()
     at = (index[:, None, :] + grid[None]).reshape(-1, 2)
-    free = free_numbers(pattern, theta, fixed=fixed)
-    limits = torch.tensor(free.limits, dtype=torch.float64)
+    limits = step_limits(pattern, theta, fixed=fixed)
     shape = (len(index), len(grid))
 
-    def points_of(moving: Tensor) -> Tensor:
-        return sample_points(level, pattern, free.into(theta, moving), at)[0]
+    def points_of(numbers: Tensor) -> Tensor:
+        return sample_points(level, pattern, numbers, at)[0]
 
     for _ in range(iterations):
-        points, slopes = with_slopes(points_of, free.of(theta), limits)
+        points, slopes = with_slopes(points_of, theta, limits)
         in_front = sample_points(level, pattern, theta, at)[1]
         points = points.float()
         known = (sample_valid(level.valid, points) & in_front).reshape(shape)
@@ -114,7 +93,7 @@ def refine(
         if not bool(torch.isfinite(step).all()):
             break
         worst = float(step.abs().max())
-        theta = free.into(theta, free.of(theta) + step * limits / max(1.0, worst))
+        theta = theta + step * limits / max(1.0, worst)
         if worst < _CONVERGED:
             break
     return theta
@@ -128,7 +107,7 @@ def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor) -> 
     residual = values - _mean(values, weights)
     squared = residual.square().sum(-1)
     typical = squared[weights > 0].median() if bool((weights > 0).any()) else squared.new_ones(())
-    weights = weights / (1 + squared / (_ROBUST_SCALE**2 * typical + 1e-6))
+    weights = weights / (1 + squared / (ROBUST_SCALE**2 * typical + 1e-6))
     residual = values - _mean(values, weights)
     rows = torch.einsum("nkdc,nkdp->nkcp", slopes, jacobian)
     rows = rows - _mean(rows, weights)  # the mean cell moves along

@@ -11,6 +11,8 @@ from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import mean_contrast, placed_right
 from p3i.search.result import Reading
 
+FEWEST_SEEN = 3
+"""Fewer objects in sight say nothing of a curve: through two points there are circles anywhere."""
 SUPPORT = 0.12
 """A cell belongs to a pattern where the others predict it this much better than at half steps; the same
 figure is taken off before cells are summed, so that many doubtful cells make no pattern."""

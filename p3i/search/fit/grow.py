@@ -28,7 +28,7 @@ from p3i.search.forms.lattice import (
     map_from_index,
 )
 from p3i.search.forms.spelled import lattice_filling
-from p3i.search.look.cells import HALF_STEPS, agreement, contrast, mean_cell, read_cells, sample_grid
+from p3i.search.look.cells import HALF_STEPS, agreement, contrast, mean_cell, members, read_cells, sample_grid
 from p3i.search.look.correlate import find_instances
 from p3i.search.look.evidence import Evidence, Level
 
@@ -47,11 +47,11 @@ def measure(level: Level, pattern: Pattern, theta: Tensor, *, start: Tensor | No
     index = cells_in_view(level, pattern, theta, around=around)
     if len(index) < FEWEST_OBJECTS:
         return None
-    weights = torch.ones(len(index)) if start is None else _members(index, start).float()
+    weights = torch.ones(len(index)) if start is None else members(index, start).float()
     if float(weights.sum()) < 3:
         return None
     found = contrast(level, pattern, theta, index, weights=weights, grid=sample_grid())
-    return weighed(level, pattern, theta, index, found.contrast)
+    return weighed(level, pattern, theta, index, found)
 
 
 def weighed(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, contrast: Tensor) -> Fit:
@@ -224,12 +224,6 @@ def _smoothed(index: Tensor, values: Tensor) -> Tensor:
     kernel = np.array([[0, 1, 0], [1, 2, 1], [0, 1, 0]], np.float32) / 6
     mean = cv2.filter2D(plane, -1, kernel, borderType=cv2.BORDER_CONSTANT)
     return torch.from_numpy(mean[tuple((whole - low).T)])
-
-
-def _members(index: Tensor, of: Tensor) -> Tensor:
-    """Which rows of `index` [N, 2] stand in `of` [M, 2], [N] bool."""
-    rows = {tuple(row) for row in of.tolist()}
-    return torch.tensor([tuple(row) in rows for row in index.tolist()])
 
 
 def _sample_of(count: int, generator: torch.Generator) -> Tensor:

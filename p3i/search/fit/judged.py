@@ -20,8 +20,9 @@ from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.config import FEWEST_OBJECTS, SearchConfig
+from p3i.search.fit.fitted import FEWEST_SEEN
 from p3i.search.forms.lattice import Lattice, cell_px, cells_in_view, in_shortest_steps
-from p3i.search.look.cells import HALF_STEPS, contrast, sample_grid, sample_points
+from p3i.search.look.cells import HALF_STEPS, contrast, members, sample_grid, sample_points
 from p3i.search.look.evidence import Evidence, Level
 from p3i.search.look.patches import (
     find_objects,
@@ -37,7 +38,6 @@ from p3i.search.look.thinned import thinned
 MOST_JUDGED = 600
 """More objects than this are not needed to judge a program."""
 _ROUNDS = 4
-_FEWEST_PATCHES = 3
 # A cell as flat as a line is none.
 _LEAST_AREA = 1e-6
 # Cells looked for in a picture, of which MOST_JUDGED are read.
@@ -92,7 +92,7 @@ def judged_cells(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedCells]:
     for name in judging_features(evidence.config):
         level = evidence.level_for(side, name=name)
         whole = cells_in_view(level, pattern, theta, most=_MOST_IN_VIEW)
-        drawn = _drawn(whole, pattern)
+        drawn = whole[members(whole, pattern.index)]
         enough = len(drawn) >= FEWEST_OBJECTS
         index = drawn if enough else seen
         index = index[thinned(index, MOST_JUDGED)]
@@ -105,7 +105,7 @@ def judged_cells(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedCells]:
             grid=sample_grid(),
             rounds=_ROUNDS,
         )
-        yield JudgedCells(pattern, level, index, found.contrast, enough)
+        yield JudgedCells(pattern, level, index, found, enough)
 
 
 def _side_of_middle(evidence: Evidence, pattern: Pattern, seen: Tensor) -> float:
@@ -124,14 +124,6 @@ def judging_features(config: SearchConfig) -> tuple[str, ...]:
     return (names,) if "rgb" in names.split("+") else (names, names + "+rgb")
 
 
-def _drawn(index: Tensor, pattern: Pattern) -> Tensor:
-    """Those of the cells `index` [N, 2] that the program draws."""
-    drawn = set(map(tuple, pattern.index.tolist()))
-    return index[
-        torch.tensor([pair in drawn for pair in map(tuple, index.long().tolist())], dtype=torch.bool)
-    ]
-
-
 def judged_patches(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedPatches]:
     """The patches of a program on a curve or along one loop, at its draws and elsewhere in their sector.
 
@@ -140,14 +132,12 @@ def judged_patches(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedPatch
     focal_mm = evidence.focal_mm
     for theta in _places(pattern):
         index = pattern.index[evidence.in_sight(pattern, theta)].double()
-        if len(index) < _FEWEST_PATCHES:
+        if len(index) < FEWEST_SEEN:
             continue
         index = index[thinned(index, MOST_JUDGED)]
         side = spacing(pattern, theta)
         found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
-        yield JudgedPatches(
-            found.contrast, partial(_misfit, evidence, pattern, theta, index, found.contrast, side)
-        )
+        yield JudgedPatches(found, partial(_misfit, evidence, pattern, theta, index, found, side))
 
 
 def _places(pattern: Pattern) -> Iterator[Tensor]:

@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from p3i.interp.camera import project
-from p3i.search.fit.fitted import Fit
+from p3i.search.fit.features import MOST_TURN_DEG
+from p3i.search.fit.fitted import FEWEST_SEEN, Fit
 from p3i.search.fit.robust import robust_fit
 from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import score_of_curve
@@ -23,14 +24,10 @@ FOCALS_MM = (20.0, 80.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
 FOCAL_SPREAD = 0.35
 """Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise."""
-# The certainty of a focal that is held.
-_HELD = 1e12
-# One step moves angles by at most so many degrees, lengths by this share of a patch.
-_MOST_TURN_DEG = 4.0
+# One step moves lengths by at most this share of a patch.
 _MOST_SHIFT = 0.4
 MOST_ZOOM = 0.15
 """One step moves the focal's logarithm by at most this."""
-_FEWEST = 3
 
 
 def measured(
@@ -42,10 +39,10 @@ def measured(
     if side is None:
         side = spacing(pattern, theta)
     index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
-    if len(index) < _FEWEST:
+    if len(index) < FEWEST_SEEN:
         return None
     found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
-    return Fit(filling, z, focal_mm, side, index, found.contrast)
+    return Fit(filling, z, focal_mm, side, index, found)
 
 
 def registered(
@@ -61,7 +58,7 @@ def registered(
         evidence, pattern, fit.theta, fit.index, weights, side=fit.side, focal_mm=fit.focal_mm
     )
     certainty = found.certainty.double()
-    if int((certainty > 0).sum()) < _FEWEST:
+    if int((certainty > 0).sum()) < FEWEST_SEEN:
         return None
     size = evidence.image.size
     where = frames(pattern, fit.theta, fit.index, side=fit.side)
@@ -74,36 +71,28 @@ def registered(
         seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[..., -1].exp())
         return project(seen, pattern.points_at(fit.index, theta))[0]
 
-    def fitted(focal_mm: float, *, expected_mm: float, certainty_of_focal: float) -> Tensor:
+    def fitted(focal_mm: float, *, free: bool) -> Tensor:
         start = torch.cat([fit.z, torch.tensor([math.log(focal_mm)], dtype=torch.float64)])
         prior = torch.zeros(len(start), 2, dtype=torch.float64)
-        prior[-1, 0], prior[-1, 1] = math.log(expected_mm), certainty_of_focal
+        prior[-1, 0], prior[-1, 1] = math.log(evidence.focal_mm), FOCAL_SPREAD**-2
         return robust_fit(
             points_of,
             start,
             targets=targets,
             whiten=whiten,
             weights=certainty,
-            limits=_limits(fit),
+            limits=_limits(fit, MOST_ZOOM if free else 0.0),
             prior=prior,
             iterations=8,
         )
 
-    def under(focal_mm: float) -> Tensor:
-        return fitted(focal_mm, expected_mm=focal_mm, certainty_of_focal=_HELD)
-
     focal_mm = fit.focal_mm
+    numbers = fitted(focal_mm, free=free_focal)
     if free_focal:
-        expected = evidence.focal_mm
-        numbers = fitted(focal_mm, expected_mm=expected, certainty_of_focal=1 / FOCAL_SPREAD**2)
         told = float(numbers[-1].exp())
         focal_mm = min(max(told, FOCALS_MM[0]), FOCALS_MM[1])
-        if focal_mm != told and math.isfinite(
-            told
-        ):  # the other numbers are to belong to the focal that stays
-            numbers = under(focal_mm)
-    else:
-        numbers = under(focal_mm)
+        if focal_mm != told and math.isfinite(told):  # the others are to belong to the focal that stays
+            numbers = fitted(focal_mm, free=False)
     if not bool(torch.isfinite(numbers).all()):
         return None
     cost = misfit(points_of(numbers) - targets, whiten=whiten, certainty=certainty)
@@ -162,16 +151,16 @@ def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:
     return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
 
 
-def _limits(fit: Fit) -> Tensor:
-    """The most that one step may move each free number and the logarithm of the focal, [F + 1]."""
+def _limits(fit: Fit, zoom: float) -> Tensor:
+    """The most that one step may move each free number, and `zoom` for the focal's logarithm: [F + 1]."""
     radius = max(float(fit.filling.pattern.centers(fit.theta).std(0).norm()), fit.side)
     limits = []
     for unknown in fit.filling.moving:
         name = unknown.name
         if name.startswith("camera."):
-            limits.append(_MOST_TURN_DEG)
+            limits.append(MOST_TURN_DEG)
         elif ".angle." in name:
             limits.append(math.degrees(_MOST_SHIFT * fit.side / radius))
         else:
             limits.append(_MOST_SHIFT * fit.side)
-    return torch.tensor([*limits, MOST_ZOOM], dtype=torch.float64)
+    return torch.tensor([*limits, zoom], dtype=torch.float64)

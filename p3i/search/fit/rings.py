@@ -2,15 +2,13 @@
 
 import torch
 
-from p3i.search.fit.fitted import Fit
+from p3i.search.fit.fitted import FEWEST_SEEN, Fit
 from p3i.search.forms.guess import Base
 
 KEPT_QUALITY = 0.6
 """More rings are believed where their objects agree at least so well, compared with the ring's own."""
-# Every ring of a hybrid has at least this share of the contrast of the plainest, and so many objects in
-# sight: through two points there are circles anywhere.
+# Every ring of a hybrid has at least this share of the contrast of the plainest.
 _LEAST_RING = 0.25
-_FEWEST_SEEN = 3
 # Draws of two rings closer than this share of a patch are one object; so large a part may be drawn twice,
 # where rings cross.
 _SAME_OBJECT = 0.4
@@ -41,7 +39,7 @@ def evenly_sure(fit: Fit) -> bool:
     typical: list[float] = []
     for i in rings.unique():
         own = fit.contrast[rings == i]
-        if len(own) < min(_FEWEST_SEEN, int((drawn == i).sum())):
+        if len(own) < min(FEWEST_SEEN, int((drawn == i).sum())):
             return False
         typical.append(float(own.quantile(0.5)))
     return len(typical) > 1 and min(typical) >= _LEAST_RING * max(typical)

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.fit.features import free_numbers
+from p3i.search.fit.features import ROBUST_SCALE, step_limits
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.look.cells import sample_points
 from p3i.search.look.correlate import Instances
@@ -18,8 +18,6 @@ from p3i.search.look.evidence import Level
 # An offset is known to about this share of a cell, and no better than this many map pixels.
 _SHARE_NOISE = 0.02
 _PIXEL_NOISE = 0.25
-# Offsets beyond this many of those count less and less (a Cauchy weight).
-_ROBUST_SCALE = 2.0
 
 
 def fit_instances(
@@ -35,24 +33,19 @@ def fit_instances(
 
     Offsets are compared in index units, so that near and far objects count alike.
     """
-    free = free_numbers(pattern, theta)
     targets, _ = sample_points(level, pattern, theta, found.index + found.offsets)
     inverse, cell = _index_from_map(level, pattern, theta, found.index)
     noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / cell.clamp(min=1)) ** 2).sqrt()
 
-    def points_of(moving: Tensor) -> Tensor:
-        return sample_points(level, pattern, free.into(theta, moving), found.index)[0]
-
-    moved = robust_fit(
-        points_of,
-        free.of(theta),
+    return robust_fit(
+        lambda numbers: sample_points(level, pattern, numbers, found.index)[0],
+        theta,
         targets=targets,
         whiten=inverse / noise[:, None, None],
         weights=weights,
-        limits=torch.tensor(free.limits, dtype=torch.float64),
+        limits=step_limits(pattern, theta),
         iterations=iterations,
     )
-    return free.into(theta, moved)
 
 
 def robust_fit(
@@ -66,12 +59,12 @@ def robust_fit(
     prior: Tensor | None = None,
     iterations: int = 6,
 ) -> Tensor:
-    """Move numbers so that points fall on their targets: Gauss-Newton, with strays counting less.
+    """Move numbers so that points fall on their targets: Gauss-Newton, strays counting less (`ROBUST_SCALE`).
 
     `points_of` takes numbers [..., V] to points [..., N, 2], `start` [V] is where to begin, `targets` [N, 2],
     `whiten` [N, 2, 2] takes a difference of points to one in units of its noise, `weights` [N], `limits` [V]
-    is the most that a step may move each number. `prior` [V, 2], if given, holds a mean and a weight
-    (1 / variance) for each number.
+    is the most that a step may move each number, 0 where it is held. `prior` [V, 2], if given, holds a mean
+    and a weight (1 / variance) for each number.
     """
     moving = start
     for _ in range(iterations):
@@ -79,7 +72,7 @@ def robust_fit(
         residual = torch.einsum("nij,nj->ni", whiten, points - targets)
         rows = torch.einsum("nij,njp->nip", whiten, slopes)
         distance = residual.square().sum(1)
-        weight = (weights / (1 + distance / _ROBUST_SCALE**2)).sqrt()
+        weight = (weights / (1 + distance / ROBUST_SCALE**2)).sqrt()
         a = (rows * weight[:, None, None]).reshape(-1, len(start))
         b = (residual * weight[:, None]).reshape(-1)
         normal, slope = a.T @ a, a.T @ b

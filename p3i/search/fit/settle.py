@@ -26,7 +26,7 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.interp.camera import FILM_MM, project, rotation
 from p3i.interp.lens import photo_from_straight
-from p3i.search.fit.features import step_limits
+from p3i.search.fit.features import moving_limits
 from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.forms.filling import Filling
@@ -42,8 +42,8 @@ Free = Literal["focal", "lens", "bend"]
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 150
 _FEWEST = 2
-# Each is looked for twice, the second time in so many samples along a side, by so many to each side.
-_CLOSER_SIDE, _CLOSER_REACH = 24, 8
+# Each is looked for twice, the second time in so many samples along a side.
+_CLOSER_SIDE = 24
 # Degrees of freedom of the noise. Of its scale it says (4 + 2) / (4 + 4) of what a Gaussian would.
 _TAIL = 4.0
 # The scale of residuals, in units of `whitening`: where to begin, and the least that is believed, which is a
@@ -213,9 +213,7 @@ def objects_of(
     certainty = found.certainty[there]
     # Once more where they were found, in finer samples.
     about = replace(where, origin=where.points(found.offsets[there][:, None])[:, 0])
-    closer = find_about(
-        evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE, reach=_CLOSER_REACH
-    )
+    closer = find_about(evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE)
     offsets = torch.where((closer.lead > 0)[:, None], closer.offsets, 0.0)
     places, _ = project(matrix, about.points(offsets[:, None])[:, 0])
     certainty = certainty.double()
@@ -240,7 +238,6 @@ def settled(objects: Objects, *free: Free) -> Settled:
     """The program's numbers, and those of the camera that are `free`, fitted to the objects' places."""
     starts: dict[Free, float] = {"focal": math.log(objects.focal_mm), "lens": objects.k1, "bend": 0.0}
     means: dict[Free, float] = {"focal": math.log(objects.expected_mm), "lens": 0.0, "bend": 0.0}
-    theta = objects.filling.theta(objects.numbers)
     more: list[Free] = [one for one in free for _ in range(_NUMBERS[one])]
     fit = fitted(
         lambda moving: objects.seen(moving, free),
@@ -248,7 +245,12 @@ def settled(objects: Objects, *free: Free) -> Settled:
         places=objects.places,
         whiten=objects.whiten,
         weights=objects.weights,
-        limits=torch.tensor([*step_limits(objects.filling, theta), *(_LIMITS[one] for one in more)]).double(),
+        limits=torch.cat(
+            [
+                moving_limits(objects.filling, objects.numbers),
+                torch.tensor([_LIMITS[one] for one in more]).double(),
+            ]
+        ),
         mean=torch.cat([objects.numbers, torch.tensor([means[one] for one in more]).double()]),
         known=torch.tensor([0.0] * len(objects.numbers) + [_SPREADS[one] ** -2 for one in more]).double(),
     )

@@ -54,6 +54,12 @@ def read_cells(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, gri
     return Cells(values.reshape(*shape, -1), known.reshape(shape))
 
 
+def members(index: Tensor, of: Tensor) -> Tensor:
+    """Which rows of `index` [N, 2] stand in `of` [M, 2], [N] bool."""
+    rows = {tuple(row) for row in of.tolist()}
+    return torch.tensor([tuple(row) in rows for row in index.tolist()], dtype=torch.bool)
+
+
 def agreement(a: Tensor, b: Tensor, known: Tensor) -> Tensor:
     """2 <a, b> / (|a|^2 + |b|^2) over the known samples: 1 equal, 0 unrelated; [..., K, C] -> [...].
 
@@ -72,25 +78,24 @@ def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
     return torch.einsum("nk,nkc->kc", weight, cells.values) / total.clamp(min=1e-6)[:, None], total
 
 
+def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
+    """For each of `own` [N, ...] the weighted mean of all others, by sample.
+
+    `known` says which samples count, in as many dimensions; `weights` [N]. Where no other is known, the mean
+    of all.
+    """
+    weight = known * weights.to(own).reshape(-1, *[1] * (own.dim() - 1))
+    total = weight.sum(0, keepdim=True)
+    mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
+    rest = total - weight
+    others = (mean * total - weight * own) / rest.clamp(min=1e-6)
+    return torch.where(rest > 1e-3, others, mean)
+
+
 def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:
     """Each cell's agreement with the weighted mean of all the others, [N]."""
-    mean, total = mean_cell(cells, weights)
-    own = cells.known * weights[:, None].to(cells.values)
-    rest = (total[None] - own).clamp(min=1e-6)[..., None]
-    others = (mean[None] * total[None, :, None] - own[..., None] * cells.values) / rest
+    others = mean_of_others(cells.values, cells.known[..., None], weights)
     return agreement(cells.values, others, cells.known)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Contrast:
-    """How well each cell is predicted by the others, [N] each.
-
-    `agreement`: with the mean of all other cells. `contrast`: the same less the best that the mean reaches
-    half a step away; what a pattern has and a smooth or striped picture has not.
-    """
-
-    agreement: Tensor
-    contrast: Tensor
 
 
 def contrast(
@@ -101,34 +106,36 @@ def contrast(
     *,
     weights: Tensor,
     grid: Tensor,
-    half_steps: Tensor = HALF_STEPS,
     rounds: int = 2,
-) -> Contrast:
-    """Predict each cell from all others. `weights` [N] start the mean; then the contrast itself weighs."""
+) -> Tensor:
+    """How well each cell about `index` [N, 2] is predicted by the others: `contrast_of`."""
     # All in one reading: what a cell costs is little, what a call costs is not.
-    steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), half_steps, -half_steps])
+    steps = torch.cat([torch.zeros(1, 2, dtype=index.dtype), HALF_STEPS, -HALF_STEPS])
     every = read_cells(level, pattern, theta, (index[None] + steps[:, None]).reshape(-1, 2), grid)
     values = every.values.reshape(len(steps), len(index), *every.values.shape[1:])
     known = every.known.reshape(len(steps), len(index), -1)
     return contrast_of(Cells(values, known), weights=weights, rounds=rounds)
 
 
-def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Contrast:
+def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Tensor:
     """The contrast [N] of cells that were read whole and at half steps.
+
+    It is each cell's agreement with the mean of all others, less the best that the mean reaches half a step
+    away: what a pattern has, and a smooth or striped picture has not.
 
     Shapes: cells.values [1 + 2 * M, N, K, C] and known [1 + 2 * M, N, K]: the whole cells, then those M half
     steps ahead, then those behind. `weights` [N] start the mean; then the contrast itself weighs.
     """
     values, known = cells.values, cells.known
     whole = Cells(values[0], known[0])
-    found = Contrast(torch.zeros(values.shape[1]), torch.zeros(values.shape[1]))
+    found = torch.zeros(values.shape[1])
     weights = weights.float()
     for _ in range(rounds):
         mean, _ = mean_cell(whole, weights)
         others = agreement_with_others(whole, weights)
         at_half = agreement(values[1:], mean, known[1:]).unflatten(0, (2, -1))
-        found = Contrast(others, others - at_half.mean(0).amax(0).clamp(min=0))
-        weights = found.contrast.clamp(min=0)
+        found = others - at_half.mean(0).amax(0).clamp(min=0)
+        weights = found.clamp(min=0)
         if float(weights.sum()) <= 0:
             break
     return found

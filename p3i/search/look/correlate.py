@@ -11,14 +11,11 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.look.cells import read_cells
+from p3i.search.look.cells import mean_of_others, read_cells
 from p3i.search.look.evidence import Level
 
 SIDE = 12
 """Samples along a cell's side."""
-
-_REACH = 1 / 3
-"""The search reaches so much of a cell to each side."""
 
 # An instance counts where its peak beats the rim of the search by this much.
 _LEAST_LEAD = 0.05
@@ -50,26 +47,28 @@ def find_instances(
 
     A cell takes no part in the mean that it is compared with, and is read at `side` samples along its side.
     """
-    reach = round(_REACH * side)
-    wide = side + 2 * reach
+    wide = side + 2 * reach_of(side)
     steps = (torch.arange(wide, dtype=torch.float64) - (wide - 1) / 2) / side
     cells = read_cells(level, pattern, theta, index, torch.cartesian_prod(steps, steps))
     planes = cells.values.reshape(len(index), wide, wide, -1).permute(0, 3, 1, 2)  # [N, C, a, b]
-    known = cells.known.reshape(len(index), 1, wide, wide).float()
-    middle = slice(reach, reach + side)
-    templates = mean_of_others(planes[:, :, middle, middle], known[:, :, middle, middle], weights)
-    offsets, peak, lead = correlate(planes, known, templates)
+    return located(index, planes, cells.known.reshape(len(index), wide, wide), weights, side=side)
+
+
+def reach_of(side: int) -> int:
+    """The samples to each side by which what is `side` samples wide is searched for: a third of it."""
+    return round(side / 3)
+
+
+def located(index: Tensor, planes: Tensor, known: Tensor, weights: Tensor, *, side: int) -> Instances:
+    """Where in planes [N, C, w, w] what lies in the middle of all others is; known [N, w, w] bool.
+
+    `side` is how wide that is; offsets are (row, column) in sides, w = side + 2 * reach_of(side).
+    """
+    seen = known[:, None].float()
+    middle = slice(reach_of(side), reach_of(side) + side)
+    templates = mean_of_others(planes[:, :, middle, middle], seen[:, :, middle, middle], weights)
+    offsets, peak, lead = correlate(planes, seen, templates)
     return Instances(index, offsets / side, peak, lead)
-
-
-def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
-    """For each cell [N, C, s, s] the weighted mean of all others; known [N, 1, s, s] 0 or 1, weights [N]."""
-    weight = known * weights.float()[:, None, None, None]
-    total = weight.sum(0, keepdim=True)
-    mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
-    rest = (total - weight).clamp(min=1e-6)
-    others = (mean * total - weight * own) / rest
-    return torch.where(total - weight > 1e-3, others, mean)
 
 
 def correlate(planes: Tensor, known: Tensor, templates: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -10,7 +10,7 @@ allowed; plane coordinates in program units. Patch offsets (a, b) are in patch s
 across it (a quarter turn clockwise on the screen).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 import torch.nn.functional as F
@@ -18,27 +18,22 @@ from torch import Tensor
 
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
-from p3i.search.look.cells import HALF_STEPS, Cells, Contrast, contrast_of
-from p3i.search.look.correlate import Instances, correlate, mean_of_others
+from p3i.search.look.cells import HALF_STEPS, Cells, contrast_of
+from p3i.search.look.correlate import Instances, located, reach_of
 from p3i.search.look.evidence import ColourMap, Evidence
 from p3i.search.look.thinned import thinned
+from p3i.vision.oriented import double_angle
 from p3i.vision.warp import sample, sample_valid
 
 SIDE = 14
 """Samples along a patch's side."""
-REACH = 5
-"""Samples to each side by which an object is searched for around its patch: about a third of a side."""
 # Loop indices this far apart give the direction of the curve.
 _TANGENT_STEP = 0.02
-# More draws than this are not needed to say how far apart draws are.
-_MOST_MEASURED, _FEWEST_MEASURED = 400, 20
-# ... each against all others, so many distances at most.
-_MOST_DISTANCES = 2_000_000
+# So many distances between draws say how far apart they are.
+_MOST_DISTANCES = 400**2
 # An object's place is known to this share of a patch's side, and no better than this many pixels.
 _SHARE_NOISE = 0.03
 _PIXEL_NOISE = 0.3
-# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
-_FLOOR = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +68,8 @@ def spacing(pattern: Pattern, theta: Tensor) -> float:
     Draws that coincide count once.
     """
     centers = pattern.centers(theta)
-    most = max(_FEWEST_MEASURED, min(_MOST_MEASURED, _MOST_DISTANCES // max(len(centers), 1)))
-    distance = torch.cdist(centers[thinned(pattern.index, most)], centers)
+    some = thinned(pattern.index, _MOST_DISTANCES // max(len(centers), 1) + 1)
+    distance = torch.cdist(centers[some], centers)
     distance = torch.where(distance > 1e-6, distance, torch.inf).amin(1)
     finite = distance[torch.isfinite(distance)]
     return float(finite.median()) if len(finite) else 1.0
@@ -87,12 +82,22 @@ def frames(pattern: Pattern, theta: Tensor, index: Tensor, *, side: float) -> Fr
     if variable is None:
         along = torch.tensor([side, 0.0], dtype=torch.float64).expand_as(origin)
     else:
-        step = torch.zeros(2, dtype=torch.float64)
-        step[variable] = _TANGENT_STEP
-        tangent = pattern.points_at(index + step, theta) - pattern.points_at(index - step, theta)
+        tangent = tangents(pattern, theta, index, variable)
         along = side * tangent / tangent.norm(dim=1, keepdim=True).clamp(min=1e-12)
-    across = torch.stack([-along[:, 1], along[:, 0]], 1)
-    return Frames(origin, along, across)
+    return Frames(origin, along, quarter_turned(along))
+
+
+def tangents(pattern: Pattern, theta: Tensor, index: Tensor, variable: int) -> Tensor:
+    """How draws at `index` [N, 2] move with the loop variable 0, i, or 1, j, in units a step: [N, 2]."""
+    step = torch.zeros(2, dtype=torch.float64)
+    step[variable] = _TANGENT_STEP
+    ahead, behind = (pattern.points_at(index + sign * step, theta) for sign in (1, -1))
+    return (ahead - behind) / (2 * _TANGENT_STEP)
+
+
+def quarter_turned(along: Tensor) -> Tensor:
+    """Vectors of the plane [..., 2] turned by a quarter, clockwise on the screen."""
+    return torch.stack([-along[..., 1], along[..., 0]], -1)
 
 
 def half_steps(pattern: Pattern) -> Tensor:
@@ -155,10 +160,7 @@ def _features(lab: Tensor, known: Tensor) -> Tensor:
     """[N, 3, s + 2, s + 2] colours -> [N, 12, s, s] normalised features, 0 where not known [N, s, s]."""
     gx = 0.5 * (lab[:, :, 1:-1, 2:] - lab[:, :, 1:-1, :-2])
     gy = 0.5 * (lab[:, :, 2:, 1:-1] - lab[:, :, :-2, 1:-1])
-    squared = gx.square() + gy.square()
-    root = squared.sqrt().sqrt()
-    factor = root / (squared + _FLOOR**2)
-    gradient = torch.cat([root, (gx.square() - gy.square()) * factor, 2 * gx * gy * factor], 1)
+    gradient = torch.cat(double_angle(gx * gx, gy * gy, gx * gy), 1)
     return torch.cat([_normalised(gradient, known), _normalised(lab[:, :, 1:-1, 1:-1], known)], 1)
 
 
@@ -181,8 +183,8 @@ def patch_contrast(
     side: float,
     focal_mm: Tensor | float,
     rounds: int = 3,
-) -> Contrast:
-    """How well each patch at `index` [N, 2] is predicted by the others, beyond half a step away: [N] each."""
+) -> Tensor:
+    """How well each patch at `index` [N, 2] is predicted by the others, beyond half a step away: [N]."""
     steps = half_steps(pattern)
     every = torch.cat([torch.zeros(1, 2, dtype=torch.float64), steps, -steps])
     where = frames(pattern, theta, (index[None] + every[:, None]).reshape(-1, 2), side=side)
@@ -202,7 +204,6 @@ def find_objects(
     *,
     side: float,
     focal_mm: Tensor | float,
-    reach: int = REACH,
 ) -> Instances:
     """Search around each patch of `index` [N, 2] for the mean patch; `weights` [N] make that mean.
 
@@ -210,7 +211,7 @@ def find_objects(
     """
     where = frames(pattern, theta, index, side=side)
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    return find_about(evidence, matrix, where, index, weights, reach=reach)
+    return find_about(evidence, matrix, where, index, weights)
 
 
 def find_about(
@@ -221,21 +222,16 @@ def find_about(
     weights: Tensor,
     *,
     side: int = SIDE,
-    reach: int = REACH,
 ) -> Instances:
-    """`find_objects` about given frames, in so many samples to a patch side, by `reach` of them to each side.
+    """`find_objects` about given frames, in so many samples to a patch side.
 
     `matrix` [3, 3] takes program units to photo pixels; `index` [N, 2] is what the instances are called.
     """
     colours = evidence.colours_for(sample_px(matrix, where, side=side))
-    patches = read(colours, matrix, where, count=side + 2 * reach, side=side)
-    known = patches.known.float()[:, None]
-    middle = slice(reach, reach + side)
-    own, own_known = patches.values[:, :, middle, middle], known[:, :, middle, middle]
-    templates = mean_of_others(own, own_known, weights)
-    offsets, peak, lead = correlate(patches.values, known, templates)
+    patches = read(colours, matrix, where, count=side + 2 * reach_of(side), side=side)
+    found = located(index, patches.values, patches.known, weights, side=side)
     # Rows of a patch run across the curve, columns along it.
-    return Instances(index, offsets.flip(1) / side, peak, lead)
+    return replace(found, offsets=found.offsets.flip(1))
 
 
 def whitening(matrix: Tensor, where: Frames) -> Tensor:

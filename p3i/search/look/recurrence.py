@@ -27,7 +27,9 @@ from torch import Tensor
 from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.unrolled import double_angle
+from p3i.search.look.patches import quarter_turned, tangents
+from p3i.search.look.thinned import thinned
+from p3i.search.look.unrolled import orientation
 from p3i.vision.warp import sample, sample_valid
 
 Floats = NDArray[np.float32]
@@ -36,8 +38,8 @@ ALONG = 16
 """Samples along a sector; waves up to half as many can be told."""
 ACROSS = 14
 """Samples across a sector."""
-# Loop indices this far apart give the direction of a curve.
-_TANGENT_STEP = 0.02
+# More draws than this are judged by a part of them.
+_MOST_READ = 200
 # A sector of which less is known is none, and fewer than this many say nothing.
 _LEAST_KNOWN = 0.7
 _FEWEST = 3
@@ -75,17 +77,19 @@ def recurrence_bits(
     row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's.
     """
     theta = pattern.theta if theta is None else theta
+    every, index = len(index), index[thinned(index, _MOST_READ)]
+    each = every / max(len(index), 1)
 
     def read(part: Tensor, along: int) -> Sectors:
         return sectors_of(evidence, pattern, part, theta, focal_mm=focal_mm, along=along, cells=cells)
 
     if cells:
-        return min(_bits(read(index, along).waves) for along in (0, 1))
+        return each * min(_bits(read(index, along).waves) for along in (0, 1))
     along = 1 if pattern.turning is None else pattern.turning
     ring = index[:, 1 - along]
     rings = [read(index[ring == one], along) for one in ring.unique()]
     plainest = max((one.energy for one in rings), default=0.0)
-    return sum(_bits(one.waves) for one in rings if one.energy >= _FAINT * plainest)
+    return each * sum(_bits(one.waves) for one in rings if one.energy >= _FAINT * plainest)
 
 
 def _bits(waves: NDArray[np.complex64]) -> float:
@@ -154,7 +158,7 @@ def sectors_of(
     seen = known[..., whole]
     gradients, colours = (
         _without_mean(values, known)
-        for values in (np.stack(double_angle(gx, gy), 1), np.moveaxis(lab[:, 1:-1, 1:-1], -1, 1))
+        for values in (np.stack(orientation(gx, gy), 1), np.moveaxis(lab[:, 1:-1, 1:-1], -1, 1))
     )
     # [N, 6, ACROSS, ALONG], gradients and colours with the same weight.
     values = np.concatenate([_evened(gradients, seen), _evened(colours, seen)], 1)
@@ -175,12 +179,9 @@ def _points(
         where[..., 1 - along] += up[:, None]
         return pattern.points_at(where.reshape(-1, 2), theta).reshape(*where.shape)
     flat = where.reshape(-1, 2)
-    step = torch.zeros(2, dtype=torch.float64)
-    step[along] = _TANGENT_STEP
-    ahead, behind = (pattern.points_at(flat + sign * step, theta) for sign in (1, -1))
-    tangent = ((ahead - behind) / (2 * _TANGENT_STEP)).reshape(*where.shape)
+    tangent = tangents(pattern, theta, flat, along).reshape(*where.shape)
     length = tangent.norm(dim=-1, keepdim=True).clamp(min=1e-12)
-    across = torch.stack([-tangent[..., 1], tangent[..., 0]], -1) / length
+    across = quarter_turned(tangent) / length
     width = length.median(2, keepdim=True).values  # a step of this draw
     middle = pattern.points_at(flat, theta).reshape(*where.shape)
     return middle + up[:, None, None] * width * across

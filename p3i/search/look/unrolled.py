@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.look.evidence import ColourMap, Evidence
+from p3i.vision.oriented import double_angle
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -21,22 +22,21 @@ _ANGLES = 288
 _STEP = 2 * math.pi / _ANGLES
 # Rows are this far apart in log radius; a bit coarser than the angles.
 _ROW_STEP = 0.035
-# Radii in hundredths of the longer side that is looked at: program units, where that is all of the photo.
-_RADII = (3.0, 75.0)
-_COUNTS = (4, 48)
-# The level of the photo that is unrolled: its longer side, about.
-_LONGER = 400
+RADII = (3.0, 75.0)
+"""Radii in hundredths of the longer side that is looked at: program units, where that is all of the photo."""
+COUNTS = (4, 48)
+"""The least and the most objects of a ring."""
+LONGER = 400
+"""Rings are looked for on the level of the photo that has about so many pixels on its longer side."""
 # A band of rows with less than this share of the mean energy holds nothing to compare.
 _LEAST_ENERGY = 0.15
 # Bands of which less than this share is in sight are no rings.
 _LEAST_KNOWN = 0.35
 # What is near a radius: up to this factor.
 _NEAR = 1.5
-# Lab steps below which a gradient has no direction worth dividing by (as in vision/oriented.py).
-_FLOOR = 0.4
 # At most so many readings of a strip are told.
 _MOST_ROWS = 4
-_ALL_COUNTS = range(_COUNTS[0], _COUNTS[1] + 1)
+_ALL_COUNTS = range(COUNTS[0], COUNTS[1] + 1)
 _PERIODS = _ANGLES / np.array(_ALL_COUNTS, float)
 # A band is as high as the step is wide, but no ring reaches further than from half to twice its radius.
 _HEIGHTS = np.clip(np.round(_PERIODS * _STEP / _ROW_STEP).astype(int), 3, 29) | 1
@@ -78,9 +78,9 @@ def unroll(
     `about` asks for the radii near this one only.
     """
     size, share = evidence.image.size, evidence.part.share
-    colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
+    colours = evidence.colours_for(evidence.part.size.longer / LONGER)
     matrix = colours.map_from_photo.numpy() @ image_from_plane(*pose, size=size, focal_mm=focal_mm).numpy()
-    low, high = (about / _NEAR, about * _NEAR) if about is not None else (r * share for r in _RADII)
+    low, high = (about / _NEAR, about * _NEAR) if about is not None else (r * share for r in RADII)
     radii = np.exp(np.arange(math.log(low), math.log(high), _ROW_STEP))
     angles = np.arange(_ANGLES, dtype=float) * _STEP
     at, known = polar_points(colours, matrix, center, radii, angles)
@@ -119,15 +119,10 @@ def colours_at(colours: ColourMap, at: Floats) -> Floats:
     return np.asarray(taken, np.float32)
 
 
-def double_angle(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """sqrt(|grad|), and that times the cosine and the sine of twice the direction, of all colours together.
-
-    Shapes: gx, gy [..., 3] -> three [...]; as vision/oriented.py has it for each colour.
-    """
-    squared = (gx * gx + gy * gy).sum(-1)
-    root = squared**0.25
-    factor = root / (squared + _FLOOR**2)
-    return root, (gx * gx - gy * gy).sum(-1) * factor, 2 * (gx * gy).sum(-1) * factor
+def orientation(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """The `double_angle` of all colours together: gx, gy [..., 3] -> three [...]."""
+    xx, yy, xy = ((one * other).sum(-1) for one, other in ((gx, gx), (gy, gy), (gx, gy)))
+    return double_angle(xx, yy, xy)
 
 
 def gradients(lab: NDArray) -> Floats:
@@ -137,7 +132,7 @@ def gradients(lab: NDArray) -> Floats:
     inner = smooth[:, 4:-4]
     gy = np.zeros_like(inner)
     gy[1:-1] = 0.5 * (inner[2:] - inner[:-2])
-    return np.stack(double_angle(gx, gy)).astype(np.float32)
+    return np.stack(orientation(gx, gy)).astype(np.float32)
 
 
 def _features(lab: NDArray, known: NDArray) -> tuple[Floats, NDArray[np.bool_]]:

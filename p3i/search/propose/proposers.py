@@ -15,7 +15,8 @@ from p3i.search.look.session import Session
 from p3i.search.propose.holes import hole_guesses
 from p3i.search.propose.lattices import lattice_guesses
 from p3i.search.propose.paper import paper_guesses
-from p3i.search.propose.rings import guesses_around, ring_guesses
+from p3i.search.propose.repeats import guesses_around
+from p3i.search.propose.votes import ring_guesses
 
 Rounds = Iterator[Iterable[Guess]]
 

@@ -12,18 +12,17 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import Camera
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.unrolled import LONGER
 
 Array = NDArray[np.float64]
 
-# The map on which spots are looked for: its longer side, about; spots of these widths, in its pixels.
-_LONGER = 400
+# Spots of these widths are looked for, in pixels of the map.
 _WIDTHS = (2.0, 3.0, 4.5, 6.7, 10.0, 15.0)
 _MOST_SPOTS = 70
-# Alike are spots whose colours differ from their ground in the same direction, by this factor at most, and
-# whose widths differ by that factor at most.
+# Alike are spots whose colours differ from their ground in the same direction, and by this factor at most,
+# as do their widths.
 _LEAST_COSINE = 0.85
 _MOST_STRONGER = 2.5
-_MOST_WIDER = 2.3
 # Each spot is tried with this many of the spots like it, in so many draws of five.
 _FELLOWS = 16
 _DRAWS = 150
@@ -38,15 +37,6 @@ _MOST_ELLIPSES = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CircleSeed:
-    """A circle that spots may lie on: its pose (degrees), and its centre in photo pixels."""
-
-    rx_deg: float
-    ry_deg: float
-    center_px: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Spots:
     """Spots of a map: places [N, 2], widths [N], and how their colour differs from the ground [N, 3]."""
 
@@ -55,26 +45,22 @@ class _Spots:
     colour: Array
 
 
-def circle_seeds(evidence: Evidence, generator: np.random.Generator) -> list[CircleSeed]:
-    """The circles through spots that look alike, the most telling first: two for each ellipse."""
-    colours = evidence.colours_for(evidence.part.size.longer / _LONGER)
-    lab = colours.lab
+def circles(evidence: Evidence, generator: np.random.Generator) -> list[tuple[Camera, Array]]:
+    """The circles through spots that look alike, the most telling first: two for each ellipse.
+
+    Each is a camera that sees it straight on, and its centre in photo pixels.
+    """
+    colours = evidence.colours_for(evidence.part.size.longer / LONGER)
+    lab, map_from_photo = colours.lab, colours.map_from_photo.numpy()
     spots = _spots(lab, colours.valid.numpy())
     if len(spots.at) < _FEWEST:
         return []
-    photo_from_map = np.linalg.inv(colours.map_from_photo.numpy())
     size = evidence.image.size
     focal_px = Camera(focal_mm=evidence.focal_mm).focal_px(size)
     lens = np.array([[focal_px, 0, size.middle[0]], [0, focal_px, size.middle[1]], [0, 0, 1.0]])
-    found: list[CircleSeed] = []
-    for conic in _ellipses(spots, max(lab.shape[:2]), generator):
-        to_map = np.linalg.inv(photo_from_map)
-        on_photo = to_map.T @ conic @ to_map
-        found += [
-            CircleSeed(camera.rx_deg, camera.ry_deg, center)
-            for camera, center in _circles(on_photo, lens, evidence.focal_mm)
-        ]
-    return found
+    conics = _ellipses(spots, max(lab.shape[:2]), generator)
+    on_photo = [map_from_photo.T @ conic @ map_from_photo for conic in conics]
+    return [circle for conic in on_photo for circle in _circles(conic, lens, evidence.focal_mm)]
 
 
 def _spots(lab: NDArray, known: NDArray[np.bool_]) -> _Spots:
@@ -114,7 +100,7 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
     cosine = (spots.colour @ spots.colour.T) / np.maximum(strength[:, None] * strength, 1e-9)
     stronger = np.maximum(strength[:, None] / strength, strength / strength[:, None])
     wider = np.maximum(spots.width[:, None] / spots.width, spots.width / spots.width[:, None])
-    alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_WIDER)
+    alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_STRONGER)
     # Strong spots tell more than weak ones, and many on one ellipse say little where there are many anyway.
     telling = np.sqrt(strength / max(float(strength.max()), 1e-9)) / np.sqrt(np.maximum(alike.sum(1), 1))
     best: list[tuple[float, Array, NDArray]] = []

@@ -8,37 +8,37 @@ photo is unrolled, angle against the logarithm of the radius (look/unrolled.py),
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
+from p3i.search.fit.places import numbers_of
+from p3i.search.forms.guess import Guess
+from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.unrolled import Rows, best_rows, double_angle, likeness, unroll
+from p3i.search.look.session import Session
+from p3i.search.look.unrolled import Rows, best_rows, likeness, unroll
 from p3i.search.propose.poses import pose_grid
-from p3i.search.propose.spots import circle_seeds
-from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
-from p3i.size import Size
+from p3i.search.propose.spots import circles
+from p3i.search.propose.views import even_weights, gradient_view
+from p3i.search.propose.windows import MOST_TILT_DEG
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
 # The canvas of a straightened view, in pixels a side, and of its padded transform.
 _CANVAS = 96
-_PADDED = 192
+_PADDED = 2 * _CANVAS
 _POSE_STEP_DEG = 15.0
-_MOST_TILT_DEG = 62.0
-# A view reaches to where things are this many times as far away as the nearest.
-_DEPTH_RANGE = 3.5
 # Turns that between them come close to a multiple of 360/n for every n from 5 on.
 _TURNS_DEG = (36.0, 45.0, 51.4, 60.0, 72.0)
 # So many of the turns must agree: a ring of few objects answers to few.
 _AGREEING = 2
-# Peaks of the votes are this far apart, in canvas pixels, and at most so many are kept of each pose.
+# Peaks of the votes are this far apart, in canvas pixels.
 _APART = 9
-_MOST_OF_POSE = 8
 # An overlap of less than this share of the view's energy proves little.
 _LEAST_OVERLAP = 0.4
 # Centres closer than this share of the longer side are one.
@@ -70,86 +70,89 @@ class Vote:
     center_px: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RingProposal:
-    """A ring worth refining: pose (degrees), centre and radius (program units), count, and its promise."""
-
-    rx_deg: float
-    ry_deg: float
-    focal_mm: float
-    center: Array
-    radius: float
-    count: int
-    worth: float
-
-
 def rotation_votes(evidence: Evidence) -> list[Vote]:
     """The centres that rotations speak for, at most a few for each pose, the most votes first."""
     part = evidence.part
     colours = evidence.colours_for(part.size.longer / (2.5 * _CANVAS))
-    known = colours.valid.numpy().astype(np.float32)
-    size, map_from_photo = evidence.image.size, colours.map_from_photo.numpy()
+    map_from_photo = colours.map_from_photo.numpy()
     found: list[Vote] = []
-    for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, _MOST_TILT_DEG):
-        seen = image_from_plane(rx_deg, ry_deg, size=size, focal_mm=evidence.focal_mm).numpy()
-        view = _view(colours.lab, known, map_from_photo @ seen)
+    for rx_deg, ry_deg in pose_grid(_POSE_STEP_DEG, MOST_TILT_DEG):
+        seen = image_from_plane(rx_deg, ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm).numpy()
+        view = gradient_view(colours, map_from_photo @ seen, side=_CANVAS)
         if view is None:
             continue
-        tensor, weights, map_from_view = view
-        votes = _votes(tensor, weights)
+        votes = _votes(view.tensor, even_weights(view.known, view.depth))
         peaks = votes == cv2.dilate(votes, np.ones((_APART, _APART)))
         rows, columns = np.nonzero(peaks & (votes > 0))
-        for place in np.argsort(-votes[rows, columns])[:_MOST_OF_POSE]:
-            at = np.linalg.inv(map_from_photo) @ map_from_view @ [columns[place], rows[place], 1.0]
+        photo_from_view = np.linalg.inv(map_from_photo) @ view.map_from_view
+        for place in range(len(rows)):
+            at = photo_from_view @ [columns[place], rows[place], 1.0]
             center = at[:2] / at[2]
             if (np.abs(center - part.middle) < 0.53 * np.array([part.size.width, part.size.height])).all():
                 found.append(Vote(float(votes[rows[place], columns[place]]), rx_deg, ry_deg, center))
     return sorted(found, key=lambda vote: -vote.worth)
 
 
-def ring_proposals(evidence: Evidence, *, seed: int = 0) -> list[RingProposal]:
-    """Rings about the centres with the most votes and on circles of spots, the most promising first.
-
-    `seed` is that of the draws of spots.
-    """
+def ring_guesses(look: Session) -> list[Guess]:
+    """Rings about the centres with the most votes and on circles of spots, the most promising first."""
+    look.tell("turning", 0.82)
+    evidence = look.evidence
     centres: list[tuple[Vote, list[Rows]]] = []
     for votes in _by_centre(rotation_votes(evidence), evidence.part.size.longer):
         centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
-    for circle in circle_seeds(evidence, np.random.default_rng(seed)):
-        vote = Vote(_SPOTS_WORTH, circle.rx_deg, circle.ry_deg, circle.center_px)
+    for camera, center_px in circles(evidence, np.random.default_rng(look.config.seed)):
+        vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, center_px)
         centres.append((vote, _rows_about(evidence, vote)))
     centres.sort(key=_promise, reverse=True)
-    found: list[RingProposal] = []
+    found: list[Guess] = []
     for vote, rows in centres[:_MOST_CLIMBED]:
-        if not rows:
-            continue
-        vote = _climbed(evidence, vote, rows[0])
-        center = _on_plane(evidence, vote)
-        for row in _rows_about(evidence, vote):
-            pose = vote.rx_deg, vote.ry_deg
-            worth = row.worth * math.sqrt(vote.worth)
-            found.append(RingProposal(*pose, evidence.focal_mm, center, row.radius, row.count, worth))
-    return _distinct(sorted(found, key=lambda proposal: -proposal.worth))
+        if rows:
+            vote = _climbed(evidence, vote, rows[0])
+            found += [_guess(evidence, vote, row) for row in _rows_about(evidence, vote)]
+    return _distinct(sorted(found, key=lambda guess: -guess.promise))
 
 
-def _distinct(proposals: list[RingProposal]) -> list[RingProposal]:
+def _guess(evidence: Evidence, vote: Vote, row: Rows) -> Guess:
+    """A ring about the vote's centre, of as many objects as the row has."""
+    x, y = _on_plane(evidence, vote).tolist()
+    filling = ring_filling(row.count)
+    values = {
+        "camera.rx": vote.rx_deg,
+        "camera.ry": vote.ry_deg,
+        "draw.x.radius.1": row.radius,
+        "draw.x.angle.1": 0.0,
+        "draw.x.offset.1": x,
+        "draw.y.offset.1": y,
+    }
+    promise = row.worth * math.sqrt(vote.worth)
+    return Guess(filling, numbers_of(filling, values), promise, focal_mm=evidence.focal_mm)
+
+
+def _distinct(guesses: list[Guess]) -> list[Guess]:
     """Without those that a better one says already, as climbs from several centres often end at the same, and
-    without the hopeless."""
-    kept: list[RingProposal] = []
-    for one in proposals:
-        if one.worth > _LEAST_SHARE * proposals[0].worth and not any(_same(one, other) for other in kept):
+    without the hopeless; each with its promise as a share of the best one's.
+    """
+    kept: list[Guess] = []
+    for one in guesses:
+        if one.promise > _LEAST_SHARE * guesses[0].promise and not any(_same(one, other) for other in kept):
             kept.append(one)
-    return kept
+    return [replace(one, promise=one.promise / guesses[0].promise) for one in kept]
 
 
-def _same(one: RingProposal, other: RingProposal) -> bool:
-    """Whether two proposals are so close that their fits end at the same ring."""
-    near = _SAME_SHARE * other.radius
+def _same(one: Guess, other: Guess) -> bool:
+    """Whether two guesses are so close that their fits end at the same ring."""
+    if one.filling.sketch != other.filling.sketch:
+        return False
+    ours, theirs = (guess.filling.named(guess.z) for guess in (one, other))
+
+    def apart(*names: str) -> float:
+        return math.hypot(*(ours[name] - theirs[name] for name in names))
+
+    near = _SAME_SHARE * theirs["draw.x.radius.1"]
     return (
-        one.count == other.count
-        and float(np.hypot(*(one.center - other.center))) < near
-        and abs(one.radius - other.radius) < near
-        and math.hypot(one.rx_deg - other.rx_deg, one.ry_deg - other.ry_deg) < _SAME_POSE_DEG
+        apart("draw.x.offset.1", "draw.y.offset.1") < near
+        and apart("draw.x.radius.1") < near
+        and apart("camera.rx", "camera.ry") < _SAME_POSE_DEG
     )
 
 
@@ -216,38 +219,6 @@ def _by_centre(votes: list[Vote], longer: int) -> list[list[Vote]]:
             if len(groups) < _MOST_CENTRES:
                 groups.append([vote])
     return groups
-
-
-def _view(lab: Floats, known: Floats, map_from_plane: Array) -> tuple[NDArray, Floats, Array] | None:
-    """The picture straightened: the gradient's double angle as complex numbers, weights, view -> map."""
-    height, width = known.shape
-    canvas = view_canvas(map_from_plane, Size(width, height), side=_CANVAS, depth_range=_DEPTH_RANGE)
-    if canvas is None:
-        return None
-    map_from_view = map_from_plane @ canvas.plane_from_view
-    depth = depth_of_view(map_from_view, _CANVAS)
-
-    def warped(planes: Floats) -> Floats:
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        return cv2.warpPerspective(planes, map_from_view, (_CANVAS, _CANVAS), flags=flags)  # pyright: ignore
-
-    seen = cv2.erode(((depth > 0) & (warped(known) > 0.99)).astype(np.uint8), np.ones((5, 5)))
-    seen[:2] = seen[-2:] = 0
-    seen[:, :2] = seen[:, -2:] = 0
-    if not seen.any():
-        return None
-    tensor = gradient_tensor(np.asarray(cv2.GaussianBlur(warped(lab), (0, 0), 0.8), np.float32)) * seen
-    energy = cv2.GaussianBlur(np.abs(tensor) ** 2, (0, 0), 0.08 * _CANVAS)
-    tensor = tensor / np.sqrt(energy + energy.mean() + 1e-9)
-    return tensor, even_weights(seen, depth), map_from_view
-
-
-def gradient_tensor(lab: Floats) -> NDArray[np.complex64]:
-    """The gradient of a picture [H, W, 3] as complex numbers: sqrt(|grad|) times e^(2i direction)."""
-    gx = 0.5 * (np.roll(lab, -1, 1) - np.roll(lab, 1, 1))
-    gy = 0.5 * (np.roll(lab, -1, 0) - np.roll(lab, 1, 0))
-    _, cosine, sine = double_angle(gx, gy)
-    return (cosine + 1j * sine).astype(np.complex64)
 
 
 def _votes(tensor: NDArray, weights: Floats) -> Floats:

@@ -44,7 +44,7 @@ def contrast_of(count: int, *, ring: DrawnRing = RING) -> torch.Tensor:
     index = filling.pattern.index.double()
     side = spacing(filling.pattern, theta)
     found = patch_contrast(ring.evidence(), filling.pattern, theta, index, side=side, focal_mm=35.0)
-    return found.contrast
+    return found
 
 
 def test_patches_that_turn_with_the_ring_are_equal_and_upright_ones_are_not() -> None:

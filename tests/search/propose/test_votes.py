@@ -6,9 +6,13 @@ import pytest
 from drawn import DrawnRing
 
 from p3i.interp.camera import rotation
+from p3i.search.config import SearchConfig
+from p3i.search.forms.guess import Guess
+from p3i.search.look.session import Session
 from p3i.search.propose import votes as ring
 from p3i.search.propose.poses import pose_grid
-from p3i.search.propose.votes import RingProposal, Vote, gradient_tensor, ring_proposals, rotation_votes
+from p3i.search.propose.views import gradient_tensor
+from p3i.search.propose.votes import Vote, ring_guesses, rotation_votes
 
 RING = DrawnRing()
 
@@ -19,10 +23,10 @@ def votes() -> list[Vote]:
 
 
 @pytest.fixture(scope="module")
-def proposals(votes: list[Vote]) -> list[RingProposal]:
+def guesses(votes: list[Vote]) -> list[Guess]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ring, "rotation_votes", lambda evidence: votes)  # cast once
-        return ring_proposals(RING.evidence())
+        return ring_guesses(Session(RING.evidence(), SearchConfig()))
 
 
 def test_rotations_vote_for_the_centre_of_a_tilted_ring(votes: list[Vote]) -> None:
@@ -33,27 +37,30 @@ def test_rotations_vote_for_the_centre_of_a_tilted_ring(votes: list[Vote]) -> No
     assert votes[0].worth > 1.3 * elsewhere[0].worth
 
 
-def test_the_best_proposal_is_the_ring(proposals: list[RingProposal]) -> None:
-    best = proposals[0]
-    assert best.count == RING.count
-    assert abs(best.rx_deg - RING.rx_deg) < 3 and abs(best.ry_deg - RING.ry_deg) < 3
-    assert np.linalg.norm(best.center - RING.center) < 1
-    assert best.radius == pytest.approx(RING.radius, rel=0.1)
+def test_the_best_guess_is_the_ring(guesses: list[Guess]) -> None:
+    best = guesses[0]
+    assert len(best.filling.pattern.index) == RING.count
+    found = best.filling.named(best.z)
+    assert abs(found["camera.rx"] - RING.rx_deg) < 3 and abs(found["camera.ry"] - RING.ry_deg) < 3
+    center = np.array([found["draw.x.offset.1"], found["draw.y.offset.1"]])
+    assert np.linalg.norm(center - RING.center) < 1
+    assert found["draw.x.radius.1"] == pytest.approx(RING.radius, rel=0.1)
 
 
-def test_proposals_come_best_first(proposals: list[RingProposal]) -> None:
-    assert [one.worth for one in proposals] == sorted((one.worth for one in proposals), reverse=True)
+def test_guesses_come_best_first(guesses: list[Guess]) -> None:
+    assert guesses[0].promise == 1
+    assert [one.promise for one in guesses] == sorted((one.promise for one in guesses), reverse=True)
 
 
-def test_no_proposal_says_what_a_better_one_said_and_none_is_hopeless(proposals: list[RingProposal]) -> None:
+def test_no_guess_says_what_a_better_one_said_and_none_is_hopeless(guesses: list[Guess]) -> None:
     """Climbs from several centres end at this ring, and each would tell of it and of its neighbours."""
-    assert all(one.worth > 0.02 * proposals[0].worth for one in proposals)
-    told = [(one.count, *one.center, one.radius, one.rx_deg, one.ry_deg) for one in proposals]
-    for place, one in enumerate(told):
-        for other in told[:place]:
-            same_count = one[0] == other[0]
-            apart = np.abs(np.subtract(one[1:], other[1:])) > (1, 1, 1, 2, 2)
-            assert not same_count or apart.any()
+    assert all(one.promise > 0.02 for one in guesses)
+    told = [(len(one.filling.pattern.index), one.filling.named(one.z)) for one in guesses]
+    most = {"draw.x.offset.1": 1, "draw.y.offset.1": 1, "draw.x.radius.1": 1, "camera.rx": 2, "camera.ry": 2}
+    for place, (count, one) in enumerate(told):
+        for other_count, other in told[:place]:
+            apart = any(abs(one[name] - other[name]) > limit for name, limit in most.items())
+            assert count != other_count or apart
 
 
 def test_a_double_angle_turns_twice_as_fast_as_an_edge() -> None:
