@@ -157,7 +157,9 @@ def _around(evidence: Evidence, ring: _Ring, side: float) -> tuple[Array, Array]
         return None
     fit, pattern = ring.fit, ring.fit.pattern
     own = frames(pattern, fit.theta, fit.index, side=side)
-    radii = np.arange(0.5 * side, RADII[1] * evidence.part.share, _RADIUS_STEP * side)
+    # Rings about a tiny one are no further apart than it is wide; the photo has room for hundreds of them.
+    most = min(RADII[1] * evidence.part.share, (1 + _MOST_RINGS) * ring.radius)
+    radii = np.arange(0.5 * side, most, _RADIUS_STEP * side)
     angles = np.radians(ring.phase_deg + np.arange(2 * slots) * ring.step_deg / 2)
     r, angle = np.meshgrid(radii, angles, indexing="ij")
     out = np.stack([np.cos(angle), np.sin(angle)], -1).reshape(-1, 2)
