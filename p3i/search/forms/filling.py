@@ -20,7 +20,7 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.grammar.departures import departures
 from p3i.grammar.leaves import leaves, with_leaves
-from p3i.grammar.sketch import Hole, Sketch, parse_sketch
+from p3i.grammar.sketch import Hole, Sketch
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import edges, live_indices, nest
@@ -200,11 +200,9 @@ def draws(sketch: Sketch) -> Iterator[int]:
             yield _drawn(sketch, counts, values, extents, setting)
 
 
-def filling_of(text: str) -> Filling:
-    """The filling of a sketch that the search itself spells: one setting, all else to be found."""
-    sketch = parse_sketch(text)
-    assert isinstance(sketch, Sketch), sketch
-    return next(fillings(sketch, unknowns_of(sketch), most_indices=1000, most_settings=1))
+def only_filling(sketch: Sketch) -> Filling:
+    """The filling of a sketch whose whole numbers are all written."""
+    return _filling(sketch, tuple(unknowns_of(sketch)), (), (), (), ((),))
 
 
 def with_settings(filling: Filling, settings: tuple[tuple[int, ...], ...]) -> Filling:

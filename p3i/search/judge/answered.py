@@ -7,7 +7,7 @@ from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Drawn
-from p3i.search.forms.sketches import WALKED_SHAPES, Sketched, structure_of
+from p3i.search.forms.sketches import Sketched, structure_of
 from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.judge.table1 import in_table1
@@ -18,7 +18,7 @@ _FEWEST_RINGS = 2
 
 def answers_of(look: Session, sketch: Sketched, drawn: Drawn) -> list[Answer]:
     """What a drawn program is as an answer, worth what it explains; in Table 1's words where asked for."""
-    if sketch.by_hand is not None or sketch.shape in WALKED_SHAPES:
+    if sketch.gridded:
         return [_as_asked(look, drawn)]
     answer = _free(look, sketch, drawn)
     if look.config.recipe == "paper":

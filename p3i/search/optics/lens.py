@@ -142,10 +142,8 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
 
 def _followed(session: Session, answer: Answer) -> Answer | None:
     """A ring or hybrid on a straightened photo, fitted from where it is."""
-    whole = whole_filling(answer.program)
-    assert whole is not None
     focal_mm = answer.focal_mm or session.evidence.focal_mm
-    start = measured(session.evidence, *whole, focal_mm=focal_mm)
+    start = measured(session.evidence, *whole_filling(answer.program), focal_mm=focal_mm)
     if start is None:
         return None
     fit = follow(session.evidence, start, rounds=3, free_focal=tells_focal(answer))

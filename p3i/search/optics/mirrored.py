@@ -54,10 +54,9 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
     values = leaves(answer.program)
     if values.get("draw.x.angle.j", 0.0) == 0.0 or "draw.y.angle.j" not in values:
         return None
-    whole = whole_filling(answer.program)
-    if whole is None or len(whole[0].pattern.index) > _MOST_OBJECTS:
+    filling, as_written = whole_filling(answer.program)
+    if len(filling.pattern.index) > _MOST_OBJECTS:
         return None
-    filling, as_written = whole
     focal_mm = answer.focal_mm or evidence.focal_mm
     camera = Camera.of(answer.program, focal_mm=focal_mm)
     own = _fit(evidence, filling, as_written, focal_mm)
