@@ -16,7 +16,7 @@ from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Fit
 from p3i.search.judge.accept import beyond_noise
-from p3i.search.judge.region import centers_px, region_px
+from p3i.search.judge.region import objects_px, region_px
 from p3i.search.look.cells import sample_points
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
@@ -107,8 +107,7 @@ def _polygon(evidence: Evidence, answer: Answer) -> np.ndarray:
 
 def _centers(evidence: Evidence, answer: Answer) -> np.ndarray:
     """The objects of an answer, [N, 2] pixels of what was looked at."""
-    focal_mm = answer.focal_mm or evidence.focal_mm
-    return np.array(centers_px(answer.program, evidence.image, focal_mm)).reshape(-1, 4)[:, :2]
+    return objects_px(answer, evidence.image, evidence.focal_mm)[:, :2]
 
 
 def _cells_px(evidence: Evidence, fit: Fit) -> np.ndarray:

@@ -17,7 +17,7 @@ from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.spelled import ring_filling, rings_filling
-from p3i.search.judge.region import centers_px
+from p3i.search.judge.region import objects_px
 from p3i.search.look.session import Session
 from p3i.search.result import NEEDED
 
@@ -121,11 +121,8 @@ def _fitted(
 
 def _median_px(look: Session, answer: Answer, free: Answer) -> float:
     """How far the objects of an answer on the photo typically lie from the nearest of another one's."""
-    image, assumed = look.evidence.image, look.evidence.focal_mm
-    ours, theirs = (
-        np.array(centers_px(one.program, image, one.focal_mm or assumed)).reshape(-1, 4)[:, :2]
-        for one in (answer, free)
-    )
+    evidence = look.evidence
+    ours, theirs = (objects_px(one, evidence.image, evidence.focal_mm)[:, :2] for one in (answer, free))
     if len(ours) == 0 or len(theirs) == 0:
         return 0.0
     return float(np.median(np.linalg.norm(ours[:, None] - theirs, axis=2).min(1)))
