@@ -15,13 +15,12 @@ import numpy as np
 
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
-from p3i.search.extent.layout import found_layout, layout_fit, refitted
+from p3i.search.extent.layout import found_layout, refitted
 from p3i.search.forms.asked import asks_for_itself
 from p3i.search.forms.lattice import Lattice
 from p3i.search.judge.accept import beyond_noise, chosen_among
 from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.region import region_px
-from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import FINE, Evidence
 from p3i.search.look.part import Box
 from p3i.search.look.session import Session
@@ -123,17 +122,10 @@ def _seen_whole(session: Session, answer: Answer) -> Answer:
     there if that says more."""
     evidence, drawn = session.evidence, compile(answer.program)
     answer = dataclasses.replace(answer, worth=explained_bits(evidence, answer))
-    found = None
-    if answer.worth > 0:
-        found = found_layout(evidence, Lattice.of(drawn, drawn.theta), drawn.index.double())
+    found = found_layout(evidence, Lattice.of(drawn, drawn.theta), drawn.index.double())
     if found is None:
         return answer
     layout = refitted(evidence, found[0])
-    measured = layout_fit(evidence, layout)
-    if measured is None:
-        return answer
-    wider = dataclasses.replace(
-        answer, program=layout.program(), score=score_of(measured.contrast), readings=layout.readings
-    )
+    wider = dataclasses.replace(answer, program=layout.program(), readings=layout.readings)
     wider = dataclasses.replace(wider, worth=explained_bits(evidence, wider))
     return max(answer, wider, key=lambda one: one.worth)

@@ -19,9 +19,6 @@ from p3i.search.readings import offers, other_readings, reading_notes
 from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
 from p3i.vision.image import Image
 
-# A curve of which the photo shows less than this share was not seen.
-_LEAST_IN_SIGHT = 0.5
-
 
 def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, FocalSource]) -> SynthesisResult:
     """The best of the answers as the result of the search, or why none of them is one."""
@@ -149,7 +146,7 @@ def _in_sight(look: Session, answer: Answer) -> bool:
         return True
     focal_mm = answer.focal_mm or look.evidence.focal_mm
     shown = share_in_sight(answer.program, look.evidence.image, focal_mm, lens_k1=answer.lens_k1)
-    return shown >= _LEAST_IN_SIGHT
+    return shown >= 1 / 2
 
 
 def _mirrored(look: Session, answer: Answer) -> Camera | None:

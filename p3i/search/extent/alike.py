@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.search.look.evidence import FINE
 from p3i.vision.alike import Alike, alike_in
 from p3i.vision.sheet import Box, cells_from_basis, project, straighten, visible_box
 
@@ -14,13 +15,12 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_LONGER_SIDE = 640  # the photo is worked on at this size
 _SAMPLES = 250_000  # of a sheet, at most about this many
 
 
 def working_size(pixels: Floats, valid: Mask, image_from_plane: Array) -> tuple[Floats, Mask, Array]:
     """The photo [H, W, 3], its mask [H, W] and its homography [3, 3], at the size for the search."""
-    scale = _LONGER_SIDE / max(valid.shape)
+    scale = FINE / max(valid.shape)
     if scale >= 1:
         return np.asarray(pixels, np.float32), valid, np.asarray(image_from_plane, float)
     size = (max(1, round(valid.shape[1] * scale)), max(1, round(valid.shape[0] * scale)))

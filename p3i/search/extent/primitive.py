@@ -44,14 +44,13 @@ _FINER = (
 )
 # Cosets look the same where cells agree with the others' mean this well, relative to their own, ...
 _SAME = 0.85
-# ... and different where they agree less than this.
-_DIFFERENT = 0.45
+# ... and different where they agree less than this. A finer lattice must keep this share of the contrast
+# against half steps (DESIGN.md, 4.5).
+_HALF = 0.5
 # Cells that agree with the mean of all others this well are of one kind, whatever their cosets.
 _ALIKE = 0.3
 # Cells that agree with their own kind by less than this say nothing.
 _LEAST_AGREEMENT = 0.2
-# A finer lattice must keep this share of the contrast against half steps (DESIGN.md, 4.5).
-_NEARLY_AS_GOOD = 0.5
 # This many cells, of one coset or of all, are enough to tell one lattice from another.
 _MOST_CELLS = 200
 # Where so many of the cells know their coset, the cosets are kinds, and the doubled cell is the period:
@@ -98,7 +97,7 @@ def _finer(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground | N
         if _likeness(evidence, pattern, found, coset) < _SAME:
             continue
         after = _contrast(evidence, pattern, found)
-        if after >= _NEARLY_AS_GOOD * before and (best is None or after > best[0]):
+        if after >= _HALF * before and (best is None or after > best[0]):
             best = after, found
     return None if best is None else best[1]
 
@@ -114,7 +113,7 @@ def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Gr
         at = ground.index.numpy() @ np.linalg.inv(factors)
         coset = (np.abs(at - np.round(at)) > 1e-6).any(1).astype(int)
         likeness = _likeness(evidence, pattern, ground, coset, unless_alike=True)
-        if likeness < _DIFFERENT and (best is None or likeness < best[0]):
+        if likeness < _HALF and (best is None or likeness < best[0]):
             best = likeness, factors, coset
     if best is None:
         return None, 0.0

@@ -27,8 +27,6 @@ Mask = NDArray[np.bool_]
 _SIDE = 24
 # The object's radius is looked for this far to both sides of the fit's, as a factor.
 _REACH = 1.55
-# Peaks of the profile of at least this share of the highest are told.
-_LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
 # Kinds whose means differ by less than this share of what varies along the ring are one.
@@ -93,8 +91,6 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
     peaks = peaks[(peaks >= half) & (peaks < len(profile) - half)]
     found = []
     for row in sorted(peaks, key=lambda row: -profile[row]):
-        if profile[row] < _LEAST_PEAK * profile[peaks].max():
-            break
         rows = slice(row - half, row + half)
         cell = np.asarray(template[:, rows], np.float32)
         down, turn = _middle(sectors, ring, cell, rows)

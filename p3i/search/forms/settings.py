@@ -20,7 +20,7 @@ from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.limits import SETTINGS
 from p3i.grammar.sketch import Sketch
 from p3i.interp.unroll import SLACK, live_indices, nest
-from p3i.search.forms.filling import Filling, Unknown, counts_of, over, unknowns_of, with_settings
+from p3i.search.forms.filling import Filling, Unknown, counts_of, over, unknowns_of
 
 Setting = tuple[int, ...]
 
@@ -49,10 +49,7 @@ def check_settings(sketch: Sketch, *, place: str) -> None:
 
 
 def widened(filling: Filling) -> Filling:
-    """The filling over all indices that some setting draws, or may draw where the settings are many."""
-    if _ways(filling.extents) <= _MOST_WEIGHED:
-        every = with_settings(filling, tuple(_product(filling.extents)))
-        return over(filling, [(int(i), int(j)) for i, j in every.pattern.index.tolist()])
+    """The filling over all indices that some setting may draw."""
     return over(filling, sorted(_in_reach(filling)))
 
 

@@ -4,6 +4,7 @@ A circle's radius and angle stand in x and in y and are one number each; apart t
 it, and fit what no camera does to a circle.
 """
 
+import math
 from dataclasses import replace
 
 from torch import Tensor
@@ -13,15 +14,12 @@ from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.pattern import moving_leaves
 from p3i.search.forms.filling import LENGTH_DIGITS, Filling, only_filling, whole_program_sketch
 
-# A step of the angle whose multiple comes back to within so much closes a ring, and stays.
-_CLOSED_DEG = 1e-6
-
 
 def whole_filling(program: Program) -> tuple[Filling, Tensor]:
     """The program with camera and `Draw` free, but for the step of a closed ring, and its numbers z [F]."""
     sketch = whole_program_sketch(program)
     step = leaves(program).get("draw.x.angle.j", 0.0)
-    if step and abs(round(360 / step) * step - 360) < _CLOSED_DEG:
+    if step and math.isclose(round(360 / step) * step, 360, abs_tol=1e-6):
         sketch = replace(
             sketch, holes=tuple(hole for hole in sketch.holes if not hole.path.endswith(".angle.j"))
         )

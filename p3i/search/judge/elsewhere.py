@@ -22,11 +22,7 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import Other
 
-# A fit lies elsewhere where most of its cells do: at most this share of them lies in an answer's region.
-_MOST_INSIDE = 0.5
-# Fits that explain this much of the photo are worth working out for a note ...
-_LEAST_SCORE = 0.02
-# ... and planes whose normals differ by more than this are two.
+# Planes whose normals differ by more than this are two.
 _OTHER_PLANE_DEG = 8.0
 
 Finish = Callable[[Session, Fit], Answer | None]
@@ -44,7 +40,8 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     regions, others = [_polygon(evidence, first)], []
 
     def elsewhere(points: np.ndarray) -> bool:
-        return all(_inside(region, points) <= _MOST_INSIDE for region in regions)
+        """Whether at most half of the points [N, 2] lie in the region of any pattern that was met."""
+        return all(_inside(region, points) <= 1 / 2 for region in regions)
 
     def keep(other: Answer) -> None:
         if beyond_noise(other.worth) and elsewhere(_centers(evidence, other)):
@@ -54,7 +51,7 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     for other in answers[1:]:
         keep(other)
     for fit in fits:
-        if fit.covered < _LEAST_SCORE or not session.go_on():
+        if fit.covered <= 0 or not session.go_on():  # curves cover nothing
             break
         if not elsewhere(_cells_px(evidence, fit)):
             continue

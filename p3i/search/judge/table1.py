@@ -105,13 +105,10 @@ def _fitted(
     if start is None:
         return []
     moved = follow(evidence, start, rounds=_ROUNDS, free_focal=free.focal_mm is not None)
-    # As with hybrids: how surely it repeats may be told at another place than that of the draws.
-    score = max(curve_score(moved), free.score * min(1.0, moved.quality / max(fit.quality, 1e-9)))
     answer = replace(
         free,
         program=with_leaves(filling.program(moved.z, ()), bounds),
-        score=score,
-        worth=score,
+        score=curve_score(moved),
         focal_mm=None if free.focal_mm is None else round(moved.focal_mm, 2),
     )
     away = _median_px(look, answer, free)

@@ -120,7 +120,7 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
         start = _on_photo(seen, dataclasses.replace(best, program=fit.program(), focal_mm=focal_mm))
         seen = straightened(evidence.image, now)
         again = dataclasses.replace(session, evidence=seen.looked_at(evidence))
-        start = _on_canvas(seen, start)
+        start = _rescaled(start, 1 / seen.scale)
         found = finish(again, start) if answer.structure == "lattice" else _followed(again, start)
         session.stopped = again.stopped
         if found is None:
@@ -158,12 +158,10 @@ def _noted(answer: Answer, told: LensTold) -> Answer:
 
 def _on_photo(seen: Straightened, answer: Answer) -> Answer:
     """An answer on the straightened photo, in units of the photo's canvas, with its k1."""
-    focal_mm = None if answer.focal_mm is None else answer.focal_mm * seen.scale
-    program = scaled(answer.program, seen.scale)
-    return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=seen.k1)
+    return dataclasses.replace(_rescaled(answer, seen.scale), lens_k1=seen.k1)
 
 
-def _on_canvas(seen: Straightened, answer: Answer) -> Answer:
-    """An answer in units of the photo's canvas in those of the straightened one."""
-    focal_mm = None if answer.focal_mm is None else answer.focal_mm / seen.scale
-    return dataclasses.replace(answer, program=scaled(answer.program, 1 / seen.scale), focal_mm=focal_mm)
+def _rescaled(answer: Answer, factor: float) -> Answer:
+    """The answer in units of a canvas `factor` times as small."""
+    focal_mm = None if answer.focal_mm is None else answer.focal_mm * factor
+    return dataclasses.replace(answer, program=scaled(answer.program, factor), focal_mm=focal_mm)
