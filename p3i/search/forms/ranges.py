@@ -11,7 +11,7 @@ CELL_CAMERA_DEG = 10.0
 """The coarse grid's cell for the camera's angles."""
 
 _MOST_TILT_DEG = 60.0
-_LEAST_LENGTH, _LEAST_TURN_DEG = 2.0, 4.0
+_LEAST_TURN_DEG = 4.0
 _MOST_STEP = 40.0
 _LEAST_COUNT, _MOST_COUNT = 2, 24
 _DIVISORS = (3, 36)
@@ -78,7 +78,7 @@ def _real(kind: str, path: str, variable: str, canvas: tuple[float, float]) -> R
     half = canvas[0] / 2 if path.startswith("draw.x") else canvas[1] / 2
     if kind.endswith(".radius"):
         if variable == "1":
-            return Range(_LEAST_LENGTH, max(canvas) * 0.6, CELL_UNITS, relative=True)
+            return Range(CELL_UNITS, max(canvas) * 0.6, CELL_UNITS, relative=True)
         return Range(-_MOST_STEP / 4, _MOST_STEP / 2, CELL_UNITS / 2)
     if variable == "1":
         return Range(-half, half, CELL_UNITS)

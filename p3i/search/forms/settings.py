@@ -20,7 +20,7 @@ from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.limits import SETTINGS
 from p3i.grammar.sketch import Sketch
 from p3i.interp.unroll import SLACK, live_indices, nest
-from p3i.search.forms.filling import Filling, Unknown, counts_of, over, unknowns_of
+from p3i.search.forms.filling import Filling, Unknown, by_path, counts_of, over, unknowns_of
 
 Setting = tuple[int, ...]
 
@@ -133,17 +133,12 @@ def _in_reach(filling: Filling) -> set[tuple[int, int]]:
     passing = {f"if_{number}.{part}": 0.0 for number in range(1, guards + 1) for part in "ij1"}
     open_template = with_leaves(filling.sketch.template, passing)
     loops = [one for one in filling.extents if any(path.startswith("for_") for path in one.paths)]
-    counted = {
-        path: float(value)
-        for unknown, value in zip(filling.counts, filling.values, strict=True)
-        for path in unknown.paths
-        if path.startswith("for_")
-    }
+    counted = by_path(filling.counts, filling.values)
     found: set[tuple[int, int]] = set()
     for ends in itertools.product(*({one.values()[0], one.values()[-1]} for one in loops)):
-        numbers = {path: float(end) for one, end in zip(loops, ends, strict=True) for path in one.paths}
-        numbers = {path: value for path, value in numbers.items() if path.startswith("for_")}
-        found.update(live_indices(with_leaves(open_template, counted | numbers)))
+        numbers = counted | by_path(loops, ends)
+        bounds = {path: value for path, value in numbers.items() if path.startswith("for_")}
+        found.update(live_indices(with_leaves(open_template, bounds)))
     return found
 
 

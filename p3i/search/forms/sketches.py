@@ -16,7 +16,7 @@ from p3i.grammar.sketch import Sketch
 from p3i.interp.unroll import nest
 from p3i.search.config import SearchConfig
 from p3i.search.forms.filling import whole_program_sketch
-from p3i.search.forms.length import NUMBER_BITS, PRODUCTION_BITS
+from p3i.search.forms.length import NUMBER_BITS, production_bits
 from p3i.search.forms.spelled import LATTICE, curve, spelled
 from p3i.search.result import StructureFound
 
@@ -53,10 +53,8 @@ class Sketched:
     @property
     def bits(self) -> float:
         """What it takes to write down: its productions, and each number that is to be found."""
-        parts = nest(self.sketch.template)
-        productions = 1 + (parts.for_i is not None) + (parts.for_j is not None) + len(parts.guards)
         numbers = {hole.name or hole.path for hole in self.sketch.holes}
-        return NUMBER_BITS * len(numbers) + PRODUCTION_BITS * productions
+        return NUMBER_BITS * len(numbers) + production_bits(self.sketch.template)
 
 
 def sketches(config: SearchConfig) -> list[Sketched]:
