@@ -4,10 +4,9 @@ from dataclasses import replace
 
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
-from p3i.search.extent.layout import found_layout, layout_fit, refitted
+from p3i.search.extent.layout import found_layout, refitted
 from p3i.search.forms.lattice import Lattice
 from p3i.search.judge.bits import explained_bits
-from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import Evidence
 
 
@@ -23,11 +22,6 @@ def drawn_anew(evidence: Evidence, answer: Answer) -> Answer:
     if found is None:
         return answer
     layout = refitted(evidence, found[0])
-    measured = layout_fit(evidence, layout)
-    if measured is None:
-        return answer
-    wider = replace(
-        answer, program=layout.program(), score=score_of(measured.contrast), readings=layout.readings
-    )
+    wider = replace(answer, program=layout.program(), readings=layout.readings)
     wider = replace(wider, worth=explained_bits(evidence, wider))
     return max(answer, wider, key=lambda one: one.worth)

@@ -146,22 +146,28 @@ class SearchConfig:
 
     def check_for_all(self) -> None:
         """Raise UsageError for an option that speaks of one pattern, where all of a photo are asked for."""
-        one = {"sketch": self.sketch, "start": self.start, "exhaustive": self.exhaustive_s}
-        named = [name for name, value in one.items() if value is not None]
-        named += ["recipe paper"] if self.recipe == "paper" else []
+        named = self._ways_asked()
         named += ["extent image"] if self.extent == "image" else []
         named += ["top"] if self.top > 1 else []
         if named:
             raise UsageError(f"--{named[0]} speaks of one pattern, --all of every one: leave one out")
+
+    def _ways_asked(self) -> list[str]:
+        """The options that say how to search, as they are spelled."""
+        said = {
+            "sketch": self.sketch is not None,
+            "start": self.start is not None,
+            "recipe paper": self.recipe == "paper",
+            "exhaustive": self.exhaustive_s is not None,
+        }
+        return [way for way, asked in said.items() if asked]
 
     def _check_asked(self) -> None:
         """What says how to search: a sketch, a start, a recipe, or nothing.
 
         No option is overruled or left unread in silence: what cannot be honoured beside it is refused.
         """
-        asked = [name for name in ("sketch", "start") if getattr(self, name) is not None]
-        asked += ["recipe paper"] if self.recipe == "paper" else []
-        asked += ["exhaustive"] if self.exhaustive_s is not None else []
+        asked = self._ways_asked()
         if len(asked) > 1:
             raise UsageError(f"--{asked[0]} and --{asked[1]} contradict each other: leave one out")
         if self.sketch is not None and not self.sketch.holes:
@@ -197,8 +203,7 @@ class SearchConfig:
             return
         if self.object not in OBJECTS and not (self.object.isdecimal() and int(self.object) > 0):
             raise UsageError(f"the object is {', '.join(OBJECTS)} or a number from 1, not {self.object!r}")
-        asked = [name for name in ("sketch", "start") if getattr(self, name) is not None]
-        asked += ["recipe paper"] if self.recipe == "paper" else []
+        asked = [way for way in self._ways_asked() if way != "exhaustive"]
         asked += ["strict"] if self.strict else []
         if asked:
             raise UsageError(f"--{asked[0]} says itself where the objects are: leave out --object")

@@ -5,7 +5,7 @@ from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.forms.asked import asks_for_itself, needed_for, stated_focal, why_not
-from p3i.search.judge.accept import convincing, faint_note, false_alarms, with_printed_scores
+from p3i.search.judge.accept import faint_note, false_alarms, suffices, with_printed_scores
 from p3i.search.judge.probability import Signs, probability
 from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
@@ -19,39 +19,34 @@ from p3i.search.readings import offers, other_readings, reading_notes
 from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
 from p3i.vision.image import Image
 
-# A curve of which the photo shows less than this share was not seen.
-_LEAST_IN_SIGHT = 0.5
-
 
 def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, FocalSource]) -> SynthesisResult:
     """The best of the answers as the result of the search, or why none of them is one."""
     config, image, focal_mm = look.config, look.evidence.image, assumed[0]
-    needed = needed_for(config)
+    # What a person asked for is theirs to choose, whatever it costs.
+    asked, agreed = asks_for_itself(config), needed_for(config)
+    needed = agreed if asked else None
     if config.focal_mm == "auto":
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(look, answers)
-    # What a person asked for is theirs to choose, whatever it costs.
-    asked = asks_for_itself(config)
     written = answers if asked else [as_precise_as_fitted(look.evidence, answer) for answer in answers]
-    printed = with_printed_scores(look.evidence, written, needed=needed if asked else None)
-    sure = convincing(answers, printed, needed=needed if asked else None)
+    printed = with_printed_scores(look.evidence, written, needed=needed)
+    sure = [answer for answer in printed if suffices(answer, needed)]
     good = sure if asked else [answer for answer in sure if _in_sight(look, answer)]
     if not good:
         best = max((answer.score for answer in printed), default=0.0)
-        costly = not asked and best >= needed
+        costly = not asked and best >= agreed
         reason = StopReason.OUT_OF_SIGHT if sure else StopReason.COSTS_MORE if costly else why_not(config)
         if look.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
         least, stop = look.evidence.least_period_px, look.stopped or reason
         bits = None if asked else max((answer.worth for answer in printed), default=None)
-        facts = {"agreement": best, "bits": bits, "least_period_px": least}
-        if asked:
-            facts["needed"] = needed
+        facts = {"agreement": best, "bits": bits, "least_period_px": least, "needed": needed}
         refused = told(config, assumed, None, stop, **facts)
         look.record("answer", program=None, score=best, reason=refused.reason)
         return refused
-    good = distinct_answers(good, size=image.size, focal_mm=focal_mm)
+    good = distinct_answers(good, image=image, focal_mm=focal_mm)
     first = good[0]
     if not offers(first, config):
         stop = StopReason.NO_SUCH_OBJECT
@@ -73,7 +68,7 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     if look.unwritable - {first.structure}:
         notes = (*notes, unwritable_note(look))
     centers = centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1)
-    by_score = first.score >= needed
+    by_score = first.score >= agreed
     if not by_score and config.extent_used == "found":
         notes = (*notes, faint_note(first, len(centers)))
     look.tell("done", 1.0)
@@ -89,7 +84,7 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         bits=None if asked else first.worth,
         margin_bits=margin_bits,
         margin=margin,
-        needed=needed if by_score else None,
+        needed=agreed if by_score else None,
         false_alarms=None if asked else false_alarms(first.worth),
         candidates=tuple(
             Candidate(
@@ -151,7 +146,7 @@ def _in_sight(look: Session, answer: Answer) -> bool:
         return True
     focal_mm = answer.focal_mm or look.evidence.focal_mm
     shown = share_in_sight(answer.program, look.evidence.image, focal_mm, lens_k1=answer.lens_k1)
-    return shown >= _LEAST_IN_SIGHT
+    return shown >= 1 / 2
 
 
 def _mirrored(look: Session, answer: Answer) -> Camera | None:

@@ -24,8 +24,6 @@ MOST_PATTERNS = 24
 # What is masked of a lattice reaches half a step beyond its cells, or the rest of those at its rim would be
 # found as a pattern of their own.
 _CORNERS = torch.tensor([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)], dtype=torch.float64)
-# A further pattern of whose objects less than this share lies on ground that is not explained yet is none.
-_LEAST_NEW = 0.5
 
 Search = Callable[[Image, SearchConfig], SynthesisResult]
 
@@ -83,12 +81,12 @@ def explained_ground(result: SynthesisResult, image: Image) -> np.ndarray:
 
 
 def _is_new(result: SynthesisResult, seen: Image) -> bool:
-    """Whether enough of a result's objects lie on ground that is known still."""
+    """Whether at least half of a result's objects lie on ground that is not explained yet."""
     if not result.centers:
         return False
     x, y = np.round(np.array(result.centers)[:, :2]).astype(int).T
     known = seen.valid[y.clip(0, seen.size.height - 1), x.clip(0, seen.size.width - 1)]
-    return float(known.mean()) >= _LEAST_NEW
+    return float(known.mean()) >= 1 / 2
 
 
 def _own_notes(result: SynthesisResult) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from p3i.errors import UsageError
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.records import fields_of
 from p3i.search.config import FEATURES, STRUCTURES, SearchConfig, Structure
-from p3i.search.forms.sketches import WALKED_SHAPES, sketches_by_length
+from p3i.search.forms.sketches import WALKED_SHAPES, every_sketch
 
 SKETCH = parse_sketch("for j in range(0, 9):\n    Draw(x=9*j + ??, y=2*j)\n")
 assert isinstance(SKETCH, Sketch)
@@ -45,7 +45,7 @@ def test_a_recipe_takes_its_own_features_and_extent_where_none_are_asked_for() -
 def test_sketches_are_walked_for_every_structure_that_may_be_asked_for(structure: Structure) -> None:
     """Else the time would be taken, and nothing said."""
     walked = any(
-        one.shape in WALKED_SHAPES and structure in ("auto", one.structure) for one in sketches_by_length()
+        one.shape in WALKED_SHAPES and structure in ("auto", one.structure) for one in every_sketch()
     )
     if walked:
         assert SearchConfig(exhaustive_s=1, structure=structure).structure == structure

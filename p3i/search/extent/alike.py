@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.search.look.evidence import FINE
 from p3i.vision.alike import Alike, alike_in
 from p3i.vision.sheet import Box, cells_from_basis, project, straighten, visible_box
 
@@ -14,13 +15,12 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_LONGER_SIDE = 640  # the photo is worked on at this size
 _SAMPLES = 250_000  # of a sheet, at most about this many
 
 
 def working_size(pixels: Floats, valid: Mask, image_from_plane: Array) -> tuple[Floats, Mask, Array]:
     """The photo [H, W, 3], its mask [H, W] and its homography [3, 3], at the size for the search."""
-    scale = _LONGER_SIDE / max(valid.shape)
+    scale = FINE / max(valid.shape)
     if scale >= 1:
         return np.asarray(pixels, np.float32), valid, np.asarray(image_from_plane, float)
     size = (max(1, round(valid.shape[1] * scale)), max(1, round(valid.shape[0] * scale)))
@@ -41,7 +41,8 @@ def look_alike(
 ) -> Alike | None:
     """The common cell of a lattice in a photo of working size; None where no cell shows, or nothing in them.
 
-    `support` [H, W] of the same photo, boolean or in 0..1, says where the pattern is thought to be.
+    `support` [H, W] of the same photo, in any size, boolean or in 0..1, says where the pattern is thought
+    to be.
     """
     image_from_cells = cells_from_basis(image_from_plane, basis, origin)
     box = visible_box(image_from_cells, valid.shape)
@@ -49,15 +50,15 @@ def look_alike(
         return None
     side = int(np.clip(np.sqrt(_SAMPLES / box.count) // 2 * 2, 10, 24))
     sheet = straighten(pixels, valid, image_from_cells, box=box, side=side)
-    likely = None if support is None else _support_of_cells(support, image_from_cells, box)
+    likely = None if support is None else at_cells(support, image_from_cells, box, shape=valid.shape)
     return alike_in(sheet, likely)
 
 
-def _support_of_cells(support: NDArray, image_from_cells: Array, box: Box) -> Floats:
-    """The support [H, W] at the middle of each cell [N], 0 beyond the photo."""
+def at_cells(where: NDArray, image_from_cells: Array, box: Box, *, shape: tuple[int, int]) -> Floats:
+    """What `where` [H, W] has at the middle of each cell [N] of a photo of `shape`, 0 beyond it."""
     at, front = project(image_from_cells, box.indices.astype(float))
-    height, width = support.shape
-    x, y = np.round(np.nan_to_num(at)).clip(-1e6, 1e6).astype(int).T
+    height, width = where.shape
+    scale = np.array([width, height]) / shape[::-1]
+    x, y = np.round((np.nan_to_num(at).clip(-1e6, 1e6) + 0.5) * scale - 0.5).astype(int).T
     inside = front & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    taken = np.asarray(support, np.float32)[y.clip(0, height - 1), x.clip(0, width - 1)]
-    return np.where(inside, taken, 0).astype(np.float32)
+    return np.where(inside, where[y.clip(0, height - 1), x.clip(0, width - 1)], 0).astype(np.float32)

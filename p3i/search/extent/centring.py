@@ -21,8 +21,8 @@ from p3i.vision.warp import sample, sample_valid
 _COUNT, _WIDE = 27, 1.2
 # The window of the mean shift, as a share of a patch's side, and its steps.
 _WINDOW, _STEPS = 0.24, 12
-# Further than this share of a patch's side nothing is moved, nor for less than that.
-_MOST, _LEAST = 0.3, 0.004
+# Further than this share of a patch's side nothing is moved.
+_MOST = 0.3
 # An object must stand out from the ground by this factor.
 _STANDS_OUT = 1.5
 _TURNS = 4
@@ -42,7 +42,7 @@ def centred(evidence: Evidence, fit: Fit) -> Fit:
     for _ in range(_TURNS):
         where = frames(now.filling.pattern, now.theta, now.index, side=now.side)
         middle = _middle(_mean_patch(evidence, now, where))
-        if middle is None or float(middle.norm()) < _LEAST:
+        if middle is None:
             break
         z = _moved(now, where.points(middle[None, None])[:, 0])
         moved = measured(evidence, now.filling, z, focal_mm=now.focal_mm, side=now.side)

@@ -7,7 +7,7 @@ from p3i.search.extent.setting import drawn_as_asked
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import curve_score
 from p3i.search.forms.guess import Base
-from p3i.search.forms.sketches import WALKED_SHAPES, Sketched
+from p3i.search.forms.sketches import Sketched
 from p3i.search.look.session import Session
 
 
@@ -15,7 +15,7 @@ def drawn(look: Session, sketch: Sketched, fit: Fit, base: Base | None) -> Drawn
     """The program that a fit of this sketch means, None where no object is seen; `base`: its start."""
     if look.config.recipe == "paper":
         return filling_picture(look, fit)
-    if sketch.by_hand is not None or sketch.shape in WALKED_SHAPES:
+    if sketch.gridded:
         return drawn_as_asked(look, fit)
     if sketch.structure == "lattice":
         return drawn_lattice(look, fit)

@@ -1,7 +1,5 @@
 """From a lattice that was fitted to programs: the primitive cell, the phase, the extent, and a last fit."""
 
-from torch import Tensor
-
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.extent.layout import filling_layout, found_layout, layout_fit, refitted, strict_layout
 from p3i.search.extent.primitive import primitive
@@ -9,10 +7,8 @@ from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.grow import follow
 from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.layout import Layout
-from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.contrast import score_of
 from p3i.search.look.session import Session
-from p3i.search.result import NEEDED
 
 _ROUNDS = 4
 
@@ -28,17 +24,7 @@ def drawn_lattice(look: Session, fit: Fit) -> Drawn | None:
     if last is None or int(last.support.sum()) < FEWEST_OBJECTS:
         return None
     readings = primitive(evidence, pattern, last)
-    best = _surest(look, readings)
-    if (best is None or best.sure < NEEDED) and all(theta is not last.theta for theta, _ in readings):
-        own = _surest(look, [(last.theta, last.index[last.support])])
-        best = max((one for one in (best, own) if one is not None), key=lambda one: one.sure, default=None)
-    return best
-
-
-def _surest(look: Session, readings: list[tuple[Tensor, Tensor]]) -> Drawn | None:
-    """Of one ground's cells (theta [P], index [N, 2]), each drawn, the surest."""
-    pattern = lattice_filling().pattern
-    found = (found_layout(look.evidence, Lattice.of(pattern, theta), cells) for theta, cells in readings)
+    found = (found_layout(evidence, Lattice.of(pattern, theta), cells) for theta, cells in readings)
     drawn = (_drawn(look, *one) for one in found if one is not None)
     return max((one for one in drawn if one is not None), key=lambda one: one.sure, default=None)
 

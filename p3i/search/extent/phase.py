@@ -26,7 +26,7 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 WEIGHTS = {"symmetry": 5.0, "contrast": 3.8, "parts": 1.4, "texture": 5.5, "change": 2.0, "whole": 3.0}
-"""How much each cue of phase_cues speaks."""
+"""How much each cue of worth_of_middles speaks."""
 _STEP = 2  # samples between the phases that the rim is asked about
 _NEAR = 0.2  # of a period: phases closer than this are one place of the cell
 _MOST_PLACES = 6  # of a cell are told
@@ -60,15 +60,43 @@ def find_phases(
     support [H, W]; the plane may have any origin.
     """
     small, mask, matrix = working_size(pixels, valid, image_from_plane)
-    if support is not None and support.shape != mask.shape:
-        support = cv2.resize(np.asarray(support, np.float32), mask.shape[::-1], interpolation=cv2.INTER_AREA)
-    alike = look_alike(small, mask, matrix, basis, _middle(mask, matrix), support)
+    origin = _middle(mask, matrix)
+    alike = look_alike(small, mask, matrix, basis, origin, support)
     if alike is None or alike.level <= 0 or not (alike.weights > 0).any():
         return []
-    cell = common_cell(alike)
-    worth = sum(WEIGHTS[name] * cue for name, cue in phase_cues(alike, cell).items())
-    names = named_places(cell.colours[0])
-    return _phases(alike, basis, _middle(mask, matrix), np.asarray(worth), names)
+    side, box = alike.sheet.side, alike.sheet.box
+    colours, seen = cut(lab(alike.sheet.values), side), cut(alike.sheet.seen, side)
+    typical = alike.weights > (0.3 if (alike.weights > 0.3).any() else 0)
+    median, _ = median_cell(colours, seen, np.flatnonzero(typical))
+    inside = typical | between(typical.reshape(box.rows, box.columns)).ravel()
+    region = np.flatnonzero(inside & (alike.visible > 0.9))
+    if len(region) < 3:
+        region = np.flatnonzero(typical)
+    appearance = _appearance(alike, median)
+    worth = worth_of_middles(
+        alike.template,
+        colours=median if alike.colour_share > 0.1 else appearance,
+        appearance=appearance,
+        change=concentration(_change(colours[region], seen[region], median)),
+        whole=_whole(alike),
+    )
+    return _phases(alike, basis, origin, worth, named_places(median[0]))
+
+
+def worth_of_middles(template: Floats, *, colours: Floats, appearance: Floats, **more: Array) -> Array:
+    """How much speaks for an object's middle at each sample of a cell: [side, side].
+
+    The cell is told by what repeats in it, its `template`, by its colours, and by how it looks, each
+    [C, side, side]; `more` are further cues, by their names in WEIGHTS.
+    """
+    cues = {
+        "symmetry": symmetry(template),
+        "contrast": contrast(colours),
+        "parts": parts(appearance),
+        "texture": concentration((template**2).sum(axis=0)),
+        **more,
+    }
+    return np.asarray(sum(WEIGHTS[name] * cue for name, cue in cues.items()))
 
 
 def _middle(mask: Mask, image_from_plane: Array) -> Array:
@@ -79,48 +107,6 @@ def _middle(mask: Mask, image_from_plane: Array) -> Array:
         if point[2] > 0:
             return point[:2] / point[2]
     return np.zeros(2)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CommonCell:
-    """The common cell as it looks: `colours` [3, side, side] (median Lab), `appearance` [4, side, side].
-
-    `cells` [N, 3, side, side] are the colours of each cell that it is taken from, known where `seen`.
-    """
-
-    colours: Floats
-    appearance: Floats
-    cells: Floats
-    seen: Mask
-
-
-def common_cell(alike: Alike) -> CommonCell:
-    """The median cell of those that are surely of the pattern."""
-    side = alike.sheet.side
-    colours, seen = cut(lab(alike.sheet.values), side), cut(alike.sheet.seen, side)
-    median, _ = median_cell(colours, seen, np.flatnonzero(_typical(alike)))
-    return CommonCell(median, _appearance(alike, median), colours, seen)
-
-
-def _typical(alike: Alike) -> Mask:
-    return alike.weights > 0.3 if (alike.weights > 0.3).any() else alike.weights > 0
-
-
-def phase_cues(alike: Alike, cell: CommonCell) -> dict[str, Array]:
-    """What each witness says about an object's middle at each sample of the cell: arrays [side, side]."""
-    box, typical = alike.sheet.box, _typical(alike)
-    inside = typical | between(typical.reshape(box.rows, box.columns)).ravel()
-    region = np.flatnonzero(inside & (alike.visible > 0.9))
-    if len(region) < 3:
-        region = np.flatnonzero(typical)
-    return {
-        "symmetry": symmetry(alike.template),
-        "contrast": contrast(cell.colours if alike.colour_share > 0.1 else cell.appearance),
-        "parts": parts(cell.appearance),
-        "texture": concentration((alike.template**2).sum(axis=0)),
-        "change": concentration(_change(cell.cells[region], cell.seen[region], cell.colours)),
-        "whole": _whole(alike),
-    }
 
 
 def _appearance(alike: Alike, median: Floats) -> Floats:

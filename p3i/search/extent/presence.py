@@ -5,14 +5,13 @@ What each cell says for an object is told by p3i.vision.cell_bits; which of them
 bit, as a claim that nobody can check.
 """
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.search.extent.alike import look_alike, working_size
+from p3i.search.extent.alike import at_cells, look_alike, working_size
 from p3i.search.extent.outline import GUARD_BITS, Cells, best_outline
 from p3i.vision.cell_bits import cell_bits
-from p3i.vision.sheet import Box, cell_sides_px, cells_from_basis, project
+from p3i.vision.sheet import cell_sides_px, cells_from_basis, project
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -40,23 +39,25 @@ def cells_that_hold(
     lies outside `roi` [H, W] holds nothing, whatever is there.
     """
     small, mask, matrix = working_size(pixels, valid, image_from_plane)
-    if support is not None and support.shape != mask.shape:
-        support = cv2.resize(np.asarray(support, np.float32), mask.shape[::-1], interpolation=cv2.INTER_AREA)
     alike = look_alike(small, mask, matrix, basis, origin, support)
     if alike is None:
         return None
     box = alike.sheet.box
-    inside, shown = _middle_shows(cells_from_basis(matrix, basis, origin), box, mask.shape)
-    found = cell_bits(alike, shown)
+    image_from_cells = cells_from_basis(matrix, basis, origin)
+    middles = box.indices.astype(float)
+    at, front = project(image_from_cells, middles)
+    inside = front & ((at >= 0) & (at <= np.array(mask.shape[::-1]) - 1)).all(1)
+    large = cell_sides_px(image_from_cells, middles)[1] >= _SMALLEST_PX
+    found = cell_bits(alike, inside & large)
     if not (found.whole > 0).any():
         return None
     grid = (box.rows, box.columns)
     bits = np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid)
     halves = found.halves.reshape(4, *grid)
     if roi is not None:
-        outside = _outside(cells_from_basis(matrix, basis, origin), box, roi, roi.shape[1] / mask.shape[1])
+        asked = at_cells(roi, image_from_cells, box, shape=mask.shape).reshape(grid) > 0
         nothing = min(float(bits.min()), -GUARD_BITS)
-        bits, halves = (np.where(outside.reshape(grid), nothing, one) for one in (bits, halves))
+        bits, halves = (np.where(asked, one, nothing) for one in (bits, halves))
     return _one_pattern(bits, halves, found.judged.reshape(grid), first=(box.i_start, box.j_start))
 
 
@@ -76,21 +77,3 @@ def _one_pattern(bits: Array, halves: Array, judged: Mask, *, first: tuple[int, 
     rim, beyond = after & ~before, before & ~after & (bits > 0)
     told = np.where(rim, np.maximum(bits, halves.max(0)), np.where(beyond, -GUARD_BITS, bits))
     return Cells(told, judged & ~rim, entire & ~rim, first)
-
-
-def _outside(image_from_cells: Array, box: Box, roi: Mask, scale: float) -> Mask:
-    """Which cells [N] have their middle outside a region [H, W], `scale` of whose pixels are one here."""
-    at, front = project(image_from_cells, box.indices.astype(float))
-    x, y = np.round((np.nan_to_num(at).clip(-1e6, 1e6) + 0.5) * scale - 0.5).astype(int).T
-    height, width = roi.shape
-    inside = front & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    return ~(inside & roi[y.clip(0, height - 1), x.clip(0, width - 1)])
-
-
-def _middle_shows(image_from_cells: Array, box: Box, shape: tuple[int, int]) -> tuple[Mask, Mask]:
-    """Whether the middle of each cell [N] lies in the photo, and whether it is large enough there."""
-    points = box.indices.astype(float)
-    at, front = project(image_from_cells, points)
-    shorter = cell_sides_px(image_from_cells, points)[1]
-    inside = (at[:, 0] >= 0) & (at[:, 0] <= shape[1] - 1) & (at[:, 1] >= 0) & (at[:, 1] <= shape[0] - 1)
-    return front & inside, front & inside & (shorter >= _SMALLEST_PX)

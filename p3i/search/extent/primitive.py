@@ -1,11 +1,11 @@
-"""The primitive cell: neither a multiple of the pattern's period nor a part of it.
+"""The primitive cell: no part of the pattern's period.
 
-A search that compares a picture with its shifted self cannot tell a period from its double, and features
-that are blind to black and white take a chessboard's square for its cell. So, with the camera as found, a
-lattice and its sublattices are told apart by whether the cosets look the same: a finer lattice is taken
-where the cells that it adds look like those that were there, a coarser one where every second cell looks
-different. Looks are compared both in the search's features and in colour. Where fields are of several kinds
-without a rule, the kinds are never spread evenly: there the finer lattice is handed on beside the coarser.
+A multiple of the period is divided where it is proposed (propose/shifts.py). But features that are blind to
+black and white take a chessboard's square for its cell. So, with the camera as found, a lattice and its
+sublattices of index 2 are told apart by whether the cosets look the same: a coarser one is taken where every
+second cell looks different. Looks are compared both in the search's features and in colour. Where fields are
+of several kinds without a rule, the kinds are never spread evenly: there the finer lattice is handed on
+beside the coarser.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,6 @@ from p3i.search.look.cells import (
     Cells,
     agreement,
     agreement_with_others,
-    contrast,
     mean_cell,
     read_cells,
     sample_grid,
@@ -32,26 +31,14 @@ from p3i.search.look.cells import (
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.thinned import thinned
 
-# Rows: u and v of a sublattice in units of the lattice's. All sublattices of index 2 and 3, and the double.
+# Rows: u and v of each sublattice of index 2 in units of the lattice's.
 _DOUBLES = ([[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]])
-_FINER = (
-    *_DOUBLES,
-    [[3, 0], [0, 1]],
-    [[1, 0], [0, 3]],
-    [[1, 1], [0, 3]],
-    [[1, -1], [0, 3]],
-    [[2, 0], [0, 2]],
-)
-# Cosets look the same where cells agree with the others' mean this well, relative to their own, ...
-_SAME = 0.85
-# ... and different where they agree less than this.
+# Cosets look different where cells agree with the others' mean less than this, relative to their own.
 _DIFFERENT = 0.45
 # Cells that agree with the mean of all others this well are of one kind, whatever their cosets.
 _ALIKE = 0.3
 # Cells that agree with their own kind by less than this say nothing.
 _LEAST_AGREEMENT = 0.2
-# A finer lattice must keep this share of the contrast against half steps (DESIGN.md, 4.5).
-_NEARLY_AS_GOOD = 0.5
 # This many cells, of one coset or of all, are enough to tell one lattice from another.
 _MOST_CELLS = 200
 # Where so many of the cells know their coset, the cosets are kinds, and the doubled cell is the period:
@@ -78,29 +65,9 @@ def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tens
     found = _Ground(fit.theta, fit.index[fit.support])
     if len(found.index) < FEWEST_OBJECTS:
         return [(found.theta, found.index)]
-    for _ in range(3):  # each turn divides the cell by 2 to 4
-        finer = _finer(evidence, pattern, found)
-        if finer is None:
-            break
-        found = finer
     coarser, told = _coarser(evidence, pattern, found)
     both = [found] if coarser is None else [coarser] if told >= _TOLD else [coarser, found]
     return [(one.theta, one.index) for one in both]
-
-
-def _finer(evidence: Evidence, pattern: Pattern, ground: _Ground) -> _Ground | None:
-    """The finest lattice with a cell divided by 2, 3 or 4 whose new cells look like the old, if any."""
-    before = _contrast(evidence, pattern, ground)
-    best: tuple[float, _Ground] | None = None
-    for rows in _FINER:
-        factors = np.array(rows)
-        found, coset = _divided(pattern, ground, factors)
-        if _likeness(evidence, pattern, found, coset) < _SAME:
-            continue
-        after = _contrast(evidence, pattern, found)
-        if after >= _NEARLY_AS_GOOD * before and (best is None or after > best[0]):
-            best = after, found
-    return None if best is None else best[1]
 
 
 def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Ground | None, float]:
@@ -113,7 +80,7 @@ def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Gr
         factors = np.array(rows)
         at = ground.index.numpy() @ np.linalg.inv(factors)
         coset = (np.abs(at - np.round(at)) > 1e-6).any(1).astype(int)
-        likeness = _likeness(evidence, pattern, ground, coset, unless_alike=True)
+        likeness = _likeness(evidence, pattern, ground, coset)
         if likeness < _DIFFERENT and (best is None or likeness < best[0]):
             best = likeness, factors, coset
     if best is None:
@@ -147,33 +114,17 @@ def _told(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarr
     return most
 
 
-def _divided(pattern: Pattern, ground: _Ground, factors: np.ndarray) -> tuple[_Ground, np.ndarray]:
-    """The lattice of which the present one has every `factors`-th point, and the coset [N] of each cell."""
-    lattice = Lattice.of(pattern, ground.theta)
-    basis, change = _reduced(np.linalg.solve(factors.astype(float), lattice.basis))
-    reach = np.abs(factors).sum(0)
-    between = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in reach)), -1).reshape(-1, 2)
-    inside = between @ np.linalg.inv(factors)
-    between = between[((inside > -0.5 + 1e-9) & (inside <= 0.5 + 1e-9)).all(1)]
-    old = ground.index.numpy() @ factors
-    index = (old[:, None, :] + between[None]).reshape(-1, 2) @ change
-    coset = np.tile(np.arange(len(between)), len(old))
-    return _Ground(lattice.with_basis(basis).theta(pattern), torch.from_numpy(index)), coset
-
-
 def _reduced(basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The reduced basis, and the whole matrix that takes row indices of the old basis to the new one's."""
     reduced = reduce_basis(basis)
     return reduced, np.round(basis @ np.linalg.inv(reduced))
 
 
-def _likeness(
-    evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray, *, unless_alike: bool = False
-) -> float:
+def _likeness(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray) -> float:
     """How well cells agree with the means of the other cosets, relative to their own: 1 where cosets are one.
 
-    The lesser of features and colours; those that do not repeat within a coset have no say, and with
-    `unless_alike` those in which all cells are alike have none either.
+    The lesser of features and colours; those that do not repeat within a coset have no say, and those in
+    which all cells are alike have none either.
     """
     kinds = np.unique(coset)
     if len(kinds) < 2 or min(int((coset == kind).sum()) for kind in kinds) < 3:
@@ -184,9 +135,7 @@ def _likeness(
         own = float(
             torch.cat([agreement_with_others(g, w) for g, w in zip(groups, ones, strict=True)]).median()
         )
-        if own < _LEAST_AGREEMENT:
-            continue
-        if unless_alike and _agreement_of_all(groups) > _ALIKE:
+        if own < _LEAST_AGREEMENT or _agreement_of_all(groups) > _ALIKE:
             continue
         means = [mean_cell(group, weights)[0] for group, weights in zip(groups, ones, strict=True)]
         across = [
@@ -216,12 +165,3 @@ def _agreement_of_all(groups: list[Cells]) -> float:
     """The median agreement of the cells of all groups with the mean of all the others."""
     together = Cells(torch.cat([one.values for one in groups]), torch.cat([one.known for one in groups]))
     return float(agreement_with_others(together, torch.ones(len(together.values))).median())
-
-
-def _contrast(evidence: Evidence, pattern: Pattern, ground: _Ground) -> float:
-    """The mean contrast of the cells against half steps."""
-    some = ground.index[thinned(ground.index, _MOST_CELLS)]
-    level = evidence.level_for(side_of_cell(evidence, pattern, ground.theta))
-    weights = torch.ones(len(some))
-    found = contrast(level, pattern, ground.theta, some, weights=weights, grid=sample_grid())
-    return float(found.clamp(min=0).mean())

@@ -16,15 +16,12 @@ _MOST_PLACES = 2
 
 def drawn_ring(look: Session, fit: Fit) -> Drawn:
     """The ring with its draws put where the objects sit: at the radius that explains most."""
-    found, sure, most = fit, curve_score(fit), -math.inf
+    found, most = fit, -math.inf
     for place in places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]:
         moved = _moved(look, fit, place)
-        if moved is None:
-            continue
-        sure = max(sure, curve_score(moved))
-        if (bits := saved_bits(look.evidence, moved)) > most:
+        if moved is not None and (bits := saved_bits(look.evidence, moved)) > most:
             found, most = moved, bits
-    return Drawn(found.program(), found, sure)
+    return Drawn(found.program(), found, curve_score(found))
 
 
 def _moved(look: Session, fit: Fit, place: Place) -> Fit | None:

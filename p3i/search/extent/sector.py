@@ -13,12 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.search.extent.phase import WEIGHTS
+from p3i.search.extent.phase import worth_of_middles
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.unrolled import colours_at, gradients, polar_points
 from p3i.search.result import NEEDED_BITS
 from p3i.vision.cells import median_cell
-from p3i.vision.motif import concentration, contrast, parts, symmetry
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -28,8 +27,6 @@ Mask = NDArray[np.bool_]
 _SIDE = 24
 # The object's radius is looked for this far to both sides of the fit's, as a factor.
 _REACH = 1.55
-# Peaks of the profile of at least this share of the highest are told.
-_LEAST_PEAK = 0.5
 # The profile is smoothed by this share of a sector's side.
 _SMOOTH = 0.12
 # Kinds whose means differ by less than this share of what varies along the ring are one.
@@ -94,8 +91,6 @@ def places(evidence: Evidence, ring: Ring) -> list[Place]:
     peaks = peaks[(peaks >= half) & (peaks < len(profile) - half)]
     found = []
     for row in sorted(peaks, key=lambda row: -profile[row]):
-        if profile[row] < _LEAST_PEAK * profile[peaks].max():
-            break
         rows = slice(row - half, row + half)
         cell = np.asarray(template[:, rows], np.float32)
         down, turn = _middle(sectors, ring, cell, rows)
@@ -152,19 +147,12 @@ def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tupl
     # What is alike at every turn, a rim, is no object: without it objects and gaps are told apart. With it
     # the middle of what was told is found.
     without_rim = median - np.median(median, 2, keepdims=True)
-    column = int(np.where(allowed, _worth(template, without_rim), -np.inf).max(0).argmax())
+
+    def worth(colours: Floats) -> Array:
+        return worth_of_middles(template, colours=colours, appearance=colours)
+
+    column = int(np.where(allowed, worth(without_rim), -np.inf).max(0).argmax())
     apart = np.abs((np.arange(_SIDE) - column + _SIDE // 2) % _SIDE - _SIDE // 2)
-    worth = np.where(allowed & (apart < _SIDE // 4), _worth(template, median), -np.inf)
-    y, x = divmod(int(np.argmax(worth)), _SIDE)
+    found = np.where(allowed & (apart < _SIDE // 4), worth(median), -np.inf)
+    y, x = divmod(int(np.argmax(found)), _SIDE)
     return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)
-
-
-def _worth(template: Floats, median: Floats) -> Array:
-    """How much speaks for a middle at each sample of a sector: gradients and colours [C, n, n] -> [n, n]."""
-    cues = {
-        "symmetry": symmetry(template),
-        "contrast": contrast(median),
-        "parts": parts(median),
-        "texture": concentration((template**2).sum(0)),
-    }
-    return np.asarray(sum(WEIGHTS[name] * cue for name, cue in cues.items()))

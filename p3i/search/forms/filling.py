@@ -20,7 +20,7 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.grammar.departures import departures
 from p3i.grammar.leaves import leaves, with_leaves
-from p3i.grammar.sketch import Hole, Sketch, parse_sketch
+from p3i.grammar.sketch import Hole, Sketch
 from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import edges, live_indices, nest
@@ -116,10 +116,7 @@ class Filling:
             if unknown.hard:
                 value = min(max(value, unknown.range.lower), unknown.range.upper)
             found |= dict.fromkeys(unknown.paths, value)
-        for unknowns, values in ((self.counts, self.values), (self.extents, setting)):
-            for unknown, value in zip(unknowns, values, strict=True):
-                found |= dict.fromkeys(unknown.paths, float(value))
-        return self.sketch.fill(found)
+        return self.sketch.fill(found | by_path(self.counts, self.values) | by_path(self.extents, setting))
 
 
 def unknowns_of(sketch: Sketch, *, longer_units: tuple[float, float] = (100.0, 100.0)) -> list[Unknown]:
@@ -161,31 +158,31 @@ def fillings(
     Extents that would draw more than `most_indices` are left for later (settings.py weighs them all). Where
     the least of them draws more than that, it stands for all, with so many of its objects.
     """
-    moving = tuple(u for u in unknowns if not u.whole)
     counts, extents = counts_of(unknowns), extents_of(unknowns)
+    whole = (*counts, *extents)
     for values in itertools.product(*(u.values() for u in counts)):
         settings: list[tuple[int, ...]] = []
         least: tuple[int, tuple[int, ...]] | None = None
         for setting in _spread(extents, most_settings):
-            drawn = 2 if not extents else _drawn(sketch, counts, values, extents, setting)
+            drawn = 2 if not extents else len(_live(sketch, by_path(whole, (*values, *setting))))
             if 2 <= drawn <= most_indices:
                 settings.append(setting)
             elif drawn > most_indices and (least is None or drawn < least[0]):
                 least = drawn, setting
         if settings:
-            yield _filling(sketch, moving, counts, extents, values, tuple(settings))
+            yield _filling(sketch, unknowns, values, tuple(settings))
         elif least is not None:
-            whole = _filling(sketch, moving, counts, extents, values, (least[1],))
-            kept = thinned(whole.pattern.index, most_indices)
-            yield over(whole, [(int(i), int(j)) for i, j in whole.pattern.index[kept].tolist()])
+            full = _filling(sketch, unknowns, values, (least[1],))
+            kept = thinned(full.pattern.index, most_indices)
+            yield over(full, [(int(i), int(j)) for i, j in full.pattern.index[kept].tolist()])
 
 
-def counts_of(unknowns: list[Unknown]) -> tuple[Unknown, ...]:
+def counts_of(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
     """The whole numbers that stand in `Draw`: each value of theirs is a generator of its own."""
     return tuple(u for u in unknowns if u.whole and any(path.startswith("draw.") for path in u.paths))
 
 
-def extents_of(unknowns: list[Unknown]) -> tuple[Unknown, ...]:
+def extents_of(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
     """The whole numbers that stand in bounds and guards only."""
     counts = counts_of(unknowns)
     return tuple(u for u in unknowns if u.whole and u not in counts)
@@ -197,20 +194,18 @@ def draws(sketch: Sketch) -> Iterator[int]:
     counts, extents = counts_of(unknowns), extents_of(unknowns)
     for values in itertools.product(*(u.values() for u in counts)):
         for setting in _spread(extents, 2):
-            yield _drawn(sketch, counts, values, extents, setting)
+            yield len(_live(sketch, by_path((*counts, *extents), (*values, *setting))))
 
 
-def filling_of(text: str) -> Filling:
-    """The filling of a sketch that the search itself spells: one setting, all else to be found."""
-    sketch = parse_sketch(text)
-    assert isinstance(sketch, Sketch), sketch
-    return next(fillings(sketch, unknowns_of(sketch), most_indices=1000, most_settings=1))
+def only_filling(sketch: Sketch) -> Filling:
+    """The filling of a sketch whose whole numbers are all written."""
+    return _filling(sketch, unknowns_of(sketch), (), ((),))
 
 
 def with_settings(filling: Filling, settings: tuple[tuple[int, ...], ...]) -> Filling:
     """The same numbers with other settings of the extents."""
-    f = filling
-    return _filling(f.sketch, f.moving, f.counts, f.extents, f.values, settings)
+    unknowns = [*filling.moving, *filling.counts, *filling.extents]
+    return _filling(filling.sketch, unknowns, filling.values, settings)
 
 
 def pinned(filling: Filling, z: Tensor, which: Tensor) -> Filling:
@@ -246,42 +241,40 @@ def _spread(extents: tuple[Unknown, ...], most_settings: int) -> Iterator[tuple[
     yield from itertools.product(*chosen)
 
 
-def _drawn(
-    sketch: Sketch,
-    counts: tuple[Unknown, ...],
-    values: tuple[int, ...],
-    extents: tuple[Unknown, ...],
-    setting: tuple[int, ...],
-) -> int:
-    """How many objects the sketch draws with these whole numbers."""
-    return len(live_indices(_set(sketch, (*counts, *extents), (*values, *setting))))
-
-
-def _set(sketch: Sketch, unknowns: tuple[Unknown, ...], values: tuple[int, ...]) -> Program:
-    """The template with whole numbers in their places."""
-    by_path = {
+def by_path(unknowns: Sequence[Unknown], values: Sequence[float]) -> dict[str, float]:
+    """What each path of the unknowns holds where they have these values."""
+    return {
         path: float(value) for unknown, value in zip(unknowns, values, strict=True) for path in unknown.paths
     }
-    filled = {hole.path: hole.leaf(by_path[hole.path]) for hole in sketch.holes if hole.path in by_path}
+
+
+def _set(sketch: Sketch, numbers: dict[str, float]) -> Program:
+    """The template with these numbers, by their paths, in their holes."""
+    filled = {hole.path: hole.leaf(numbers[hole.path]) for hole in sketch.holes if hole.path in numbers}
     return with_leaves(sketch.template, filled)
+
+
+def _live(sketch: Sketch, numbers: dict[str, float]) -> list[tuple[int, int]]:
+    """The indices that the sketch draws with these whole numbers, by their paths."""
+    return live_indices(_set(sketch, numbers))
 
 
 def _filling(
     sketch: Sketch,
-    moving: tuple[Unknown, ...],
-    counts: tuple[Unknown, ...],
-    extents: tuple[Unknown, ...],
+    unknowns: Sequence[Unknown],
     values: tuple[int, ...],
     settings: tuple[tuple[int, ...], ...],
 ) -> Filling:
-    drawn = [live_indices(_set(sketch, (*counts, *extents), (*values, *setting))) for setting in settings]
+    moving = tuple(u for u in unknowns if not u.whole)
+    counts, extents = counts_of(unknowns), extents_of(unknowns)
+    numbers = [by_path((*counts, *extents), (*values, *setting)) for setting in settings]
+    drawn = [_live(sketch, one) for one in numbers]
     index = sorted(set().union(*drawn))
     places = {pair: place for place, pair in enumerate(index)}
     masks = torch.zeros(len(settings), len(index), dtype=torch.bool)
     for row, pairs in enumerate(drawn):
         masks[row, [places[pair] for pair in pairs]] = True
-    whole = compile(_set(sketch, (*counts, *extents), (*values, *settings[-1])))
-    pattern = _pattern_over(whole, index)
+    pattern = _pattern_over(compile(_set(sketch, numbers[-1])), index)
     ties = torch.zeros(len(moving), len(pattern.paths), dtype=torch.float64)
     for row, unknown in enumerate(moving):
         for path in unknown.paths:

@@ -13,9 +13,8 @@ from p3i.search.look.evidence import Level
 PHASE = frozenset({"draw.x.1", "draw.y.1"})
 """The numbers that shift all cells alike."""
 
-# A picture with fewer whole cells is looked at to its very edges: at cells of which this much shows.
+# A picture with fewer whole cells is looked at to its very edges: at cells of which half shows.
 _FEW_WHOLE = 16
-_LEAST_SHOWN = 0.5
 # Steps to each side of a cell within which its surroundings are looked for.
 _FARTHEST = 60
 
@@ -166,7 +165,7 @@ def cells_in_view(
     if cut is None:
         cut = int((inside & (area > least_px**2)).sum()) < _FEW_WHOLE
     if cut:
-        inside = _shown(matrix, index, level) >= _LEAST_SHOWN
+        inside = _shown(matrix, index, level) >= 1 / 2
     inside &= area > least_px**2
     index, area = index[inside], area[inside]
     if len(index) > most:

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, If, Program
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import Lattice
@@ -22,16 +20,6 @@ class Layout:
     j_range: tuple[int, int]
     guards: tuple[tuple[int, int, int], ...] = ()
     readings: tuple[Reading, ...] = ()
-
-    def holds(self, index: np.ndarray) -> np.ndarray:
-        """Which rows of `index` [N, 2] the layout draws."""
-        i, j = index[:, 0], index[:, 1]
-        inside = (
-            (i >= self.i_range[0]) & (i < self.i_range[1]) & (j >= self.j_range[0]) & (j < self.j_range[1])
-        )
-        for a, b, c in self.guards:
-            inside &= a * i + b * j >= c
-        return inside
 
     def program(self, *, from_zero: bool = True) -> Program:
         """The program, with both loops starting at 0, or else at the first index of each range.

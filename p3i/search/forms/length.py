@@ -15,12 +15,17 @@ PRODUCTION_BITS = 2.0
 """A loop, a guard, a circular coordinate: which of the productions."""
 
 
+def production_bits(program: Program) -> float:
+    """The bits that it takes to say which loops and guards a program has, and what it draws."""
+    parts = nest(program)
+    polar = sum(isinstance(form, Polar) for form in (parts.draw.x, parts.draw.y))
+    loops = (parts.for_i is not None) + (parts.for_j is not None)
+    return PRODUCTION_BITS * (1 + loops + len(parts.guards) + polar)
+
+
 def cost_bits(program: Program) -> float:
     """The bits that a program takes to write down."""
-    parts = nest(program)
-    bits = PRODUCTION_BITS * (1 + len(parts.guards) + (parts.for_i is not None) + (parts.for_j is not None))
-    for form in (parts.draw.x, parts.draw.y):
-        bits += PRODUCTION_BITS * isinstance(form, Polar)
+    bits = production_bits(program)
     shared: set[tuple[str, float]] = set()
     for path, value in leaves(program).items():
         if value == 0:

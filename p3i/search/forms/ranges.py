@@ -11,12 +11,12 @@ CELL_CAMERA_DEG = 10.0
 """The coarse grid's cell for the camera's angles."""
 
 _MOST_TILT_DEG = 60.0
-_LEAST_LENGTH, _LEAST_TURN_DEG = 2.0, 4.0
+_LEAST_TURN_DEG = 4.0
 _MOST_STEP = 40.0
 _LEAST_COUNT, _MOST_COUNT = 2, 24
 _DIVISORS = (3, 36)
-# How far from its start `~x` may go in the coarse search: degrees, units, a share of itself.
-_AROUND_CAMERA_DEG, _AROUND_UNITS, _AROUND_TURN_DEG, _AROUND_SHARE = 8.0, 2.0, 8.0, 0.08
+# How far from its start `~x` may go in the coarse search: degrees, and a share of itself.
+_AROUND_DEG, _AROUND_SHARE = 8.0, 0.08
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,14 +48,10 @@ def default_range(
     found = _real(kind, path, variable, canvas)
     if start is None:
         return found
-    if path.startswith("camera."):
-        reach = _AROUND_CAMERA_DEG
-    elif kind.endswith(".angle") and variable == "1":
-        reach = _AROUND_TURN_DEG
-    elif variable == "1":
-        reach = max(_AROUND_UNITS, _AROUND_SHARE * abs(start))
+    if path.startswith("camera.") or found.turns:
+        reach = _AROUND_DEG
     else:
-        reach = max(0.02, _AROUND_SHARE * abs(start))
+        reach = max(CELL_UNITS if variable == "1" else 0.02, _AROUND_SHARE * abs(start))
     return Range(start - reach, start + reach, min(found.cell, reach), turns=found.turns)
 
 
@@ -82,7 +78,7 @@ def _real(kind: str, path: str, variable: str, canvas: tuple[float, float]) -> R
     half = canvas[0] / 2 if path.startswith("draw.x") else canvas[1] / 2
     if kind.endswith(".radius"):
         if variable == "1":
-            return Range(_LEAST_LENGTH, max(canvas) * 0.6, CELL_UNITS, relative=True)
+            return Range(CELL_UNITS, max(canvas) * 0.6, CELL_UNITS, relative=True)
         return Range(-_MOST_STEP / 4, _MOST_STEP / 2, CELL_UNITS / 2)
     if variable == "1":
         return Range(-half, half, CELL_UNITS)

@@ -20,7 +20,7 @@ from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.limits import SETTINGS
 from p3i.grammar.sketch import Sketch
 from p3i.interp.unroll import SLACK, live_indices, nest
-from p3i.search.forms.filling import Filling, Unknown, counts_of, over, unknowns_of, with_settings
+from p3i.search.forms.filling import Filling, Unknown, by_path, counts_of, over, unknowns_of
 
 Setting = tuple[int, ...]
 
@@ -49,10 +49,7 @@ def check_settings(sketch: Sketch, *, place: str) -> None:
 
 
 def widened(filling: Filling) -> Filling:
-    """The filling over all indices that some setting draws, or may draw where the settings are many."""
-    if _ways(filling.extents) <= _MOST_WEIGHED:
-        every = with_settings(filling, tuple(_product(filling.extents)))
-        return over(filling, [(int(i), int(j)) for i, j in every.pattern.index.tolist()])
+    """The filling over all indices that some setting may draw."""
     return over(filling, sorted(_in_reach(filling)))
 
 
@@ -136,17 +133,12 @@ def _in_reach(filling: Filling) -> set[tuple[int, int]]:
     passing = {f"if_{number}.{part}": 0.0 for number in range(1, guards + 1) for part in "ij1"}
     open_template = with_leaves(filling.sketch.template, passing)
     loops = [one for one in filling.extents if any(path.startswith("for_") for path in one.paths)]
-    counted = {
-        path: float(value)
-        for unknown, value in zip(filling.counts, filling.values, strict=True)
-        for path in unknown.paths
-        if path.startswith("for_")
-    }
+    counted = by_path(filling.counts, filling.values)
     found: set[tuple[int, int]] = set()
     for ends in itertools.product(*({one.values()[0], one.values()[-1]} for one in loops)):
-        numbers = {path: float(end) for one, end in zip(loops, ends, strict=True) for path in one.paths}
-        numbers = {path: value for path, value in numbers.items() if path.startswith("for_")}
-        found.update(live_indices(with_leaves(open_template, counted | numbers)))
+        numbers = counted | by_path(loops, ends)
+        bounds = {path: value for path, value in numbers.items() if path.startswith("for_")}
+        found.update(live_indices(with_leaves(open_template, bounds)))
     return found
 
 

@@ -1,26 +1,40 @@
-"""The sketches that proposers write, their counts written and all else to be found.
+"""How each form of pattern is spelled as a sketch, and the fillings that proposers write.
 
-They are those of `sketches.py` but for what an extent says: bounds stand for the draws of one guess, and
-guards come when it is known which objects are there.
+Of a filling the counts and bounds are written and all else is to be found: bounds stand for the draws of one
+guess, and guards come when it is known which objects are there.
 """
 
+from dataclasses import replace
 from functools import cache
 
 from p3i.grammar.leaves import leaves, with_leaves
-from p3i.grammar.sketch import Sketch
-from p3i.search.forms.filling import Filling, filling_of, fillings, unknowns_of
+from p3i.grammar.sketch import Sketch, parse_sketch
+from p3i.search.forms.filling import Filling, only_filling
 
-_POSE = "SetCameraPose(rx=??, ry=??)\n"
-_MOST_DRAWN = 1000
+LATTICE = "Draw(x=??*i + ??*j + ??, y=??*i + ??*j + ??)"
+
+
+def spelled(draw: str, *, guards: int = 0, **bounds: str) -> Sketch:
+    """The sketch of any camera, loops with `bounds` by their variables, the first outermost, and guards."""
+    lines = [f"for {variable} in range({ends}):" for variable, ends in bounds.items()]
+    lines += ["if ??*i + ??*j >= ??:"] * guards + [draw]
+    body = "".join("    " * depth + line + "\n" for depth, line in enumerate(lines))
+    sketch = parse_sketch("SetCameraPose(rx=??, ry=??)\n" + body)
+    assert isinstance(sketch, Sketch), sketch
+    return sketch
+
+
+def curve(radius: str, angle: str, *, phase: bool = True, moves: bool = False) -> str:
+    """What draws on circles of a radius, at an angle from the `phase` on; their centre `moves` with i."""
+    angle += " + ?a" if phase else ""
+    x, y = ("?d*i + ?x", "?e*i + ?y") if moves else ("?x", "?y")
+    return f"Draw(x={radius}*Cos({angle}) + {x}, y={radius}*Sin({angle}) + {y})"
 
 
 @cache
 def lattice_filling() -> Filling:
     """The sketch of a lattice; which of its cells are drawn, its fit and its extent say."""
-    return filling_of(
-        f"{_POSE}for i in range(0, 2):\n    for j in range(0, 2):\n"
-        "        Draw(x=??*i + ??*j + ??, y=??*i + ??*j + ??)\n"
-    )
+    return only_filling(spelled(LATTICE, i="0, 2", j="0, 2"))
 
 
 def ring_filling(count: int, *, drawn: int | None = None, first: int = 0, phase: bool = True) -> Filling:
@@ -28,12 +42,8 @@ def ring_filling(count: int, *, drawn: int | None = None, first: int = 0, phase:
 
     j counts from `first`; without a `phase`, as in Table 1, from the angle 0.
     """
-    angle = f"360/{count}*j" if drawn is None else "?s*j"
-    angle += " + ?a" if phase else ""
-    last = first + (count if drawn is None else drawn)
-    return filling_of(
-        f"{_POSE}for j in range({first}, {last}):\n    Draw(x=?r*Cos({angle}) + ?x, y=?r*Sin({angle}) + ?y)\n"
-    )
+    step, number = (f"360/{count}*j", count) if drawn is None else ("?s*j", drawn)
+    return only_filling(spelled(curve("?r", step, phase=phase), j=f"{first}, {first + number}"))
 
 
 def rings_filling(
@@ -45,21 +55,15 @@ def rings_filling(
     and the angle has no phase.
     """
     radius = ("?b*i" if table1 else "(?b*i + ?r)") if grows else "?r"
-    angle = "?s*j" if fan else f"360/{count}*j"
-    angle += "" if table1 else " + ?a"
-    x, y = ("?d*i + ?x", "?e*i + ?y") if moves else ("?x", "?y")
-    last = f"{count}*i" if fan else str(count)
-    return filling_of(
-        f"{_POSE}for i in range({first}, {stop}):\n    for j in range(0, {last}):\n"
-        f"        Draw(x={radius}*Cos({angle}) + {x}, y={radius}*Sin({angle}) + {y})\n"
-    )
+    step, number = ("?s*j", f"{count}*i") if fan else (f"360/{count}*j", f"{count}")
+    draw = curve(radius, step, phase=not table1, moves=moves)
+    return only_filling(spelled(draw, i=f"{first}, {stop}", j=f"0, {number}"))
 
 
 def with_rings(filling: Filling, *, first: int, stop: int) -> Filling:
     """The same sketch with rings from `first` until before `stop`."""
-    template = with_leaves(filling.sketch.template, {"for_i.start.1": first, "for_i.stop.1": stop})
-    sketch = Sketch(template, filling.sketch.holes)
-    return next(fillings(sketch, unknowns_of(sketch), most_indices=_MOST_DRAWN, most_settings=1))
+    rings = {"for_i.start.1": first, "for_i.stop.1": stop}
+    return only_filling(replace(filling.sketch, template=with_leaves(filling.sketch.template, rings)))
 
 
 def rings_of(filling: Filling) -> tuple[int, int]:

@@ -4,6 +4,7 @@ A circle's radius and angle stand in x and in y and are one number each; apart t
 it, and fit what no camera does to a circle.
 """
 
+import math
 from dataclasses import replace
 
 from torch import Tensor
@@ -11,35 +12,19 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.pattern import moving_leaves
-from p3i.search.forms.filling import (
-    LENGTH_DIGITS,
-    Filling,
-    fillings,
-    start_values,
-    unknowns_of,
-    whole_program_sketch,
-)
-
-# A step of the angle whose multiple comes back to within so much closes a ring, and stays.
-_CLOSED_DEG = 1e-6
-# All that a program can draw.
-_ALL = 10**9
+from p3i.search.forms.filling import LENGTH_DIGITS, Filling, only_filling, whole_program_sketch
 
 
-def whole_filling(program: Program) -> tuple[Filling, Tensor] | None:
-    """The program with camera and `Draw` free, but for the step of a closed ring, and its own numbers z [F].
-
-    None for a program that draws fewer than two objects.
-    """
+def whole_filling(program: Program) -> tuple[Filling, Tensor]:
+    """The program with camera and `Draw` free, but for the step of a closed ring, and its numbers z [F]."""
     sketch = whole_program_sketch(program)
     step = leaves(program).get("draw.x.angle.j", 0.0)
-    if step and abs(round(360 / step) * step - 360) < _CLOSED_DEG:
+    if step and math.isclose(round(360 / step) * step, 360, abs_tol=1e-6):
         sketch = replace(
             sketch, holes=tuple(hole for hole in sketch.holes if not hole.path.endswith(".angle.j"))
         )
-    filling = next(fillings(sketch, unknowns_of(sketch), most_indices=_ALL, most_settings=1), None)
-    start = None if filling is None else start_values(filling)
-    return None if filling is None or start is None else (filling, start)
+    filling = only_filling(sketch)
+    return filling, filling.z_of(filling.pattern.theta)
 
 
 def scaled(program: Program, factor: float) -> Program:

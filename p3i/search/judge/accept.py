@@ -41,42 +41,27 @@ def beyond_noise(bits: float) -> bool:
     return bits > NEEDED_BITS
 
 
+def suffices(answer: Answer, needed: float | None) -> bool:
+    """Whether it is an answer: beyond noise by its `worth` in bits, or, where a person asked, by the score
+    `needed`.
+    """
+    return beyond_noise(answer.worth) if needed is None else answer.score >= needed
+
+
 def with_printed_scores(
     evidence: Evidence, answers: Sequence[Answer], *, needed: float | None
 ) -> list[Answer]:
-    """The answers, whose `worth` is in bits, with the scores that `p3i score` says of their programs.
+    """The answers with the scores that `p3i score` says of their programs, which may no longer suffice.
 
     While a program was fitted, more was known than it holds (other radii of a ring, numbers before they
-    were rounded). What cannot be an answer keeps the score that it was refused with. `needed` is the score
-    that was asked for, None where bits decide.
+    were rounded). What does not suffice keeps the score that it was refused with: what was not sure enough
+    while more was known is none the surer.
     """
-    return [
-        replace(
-            answer,
-            score=score_of_program(
-                evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1
-            ),
-        )
-        if (beyond_noise(answer.worth) if needed is None else answer.score >= needed)
-        else answer
-        for answer in answers
-    ]
 
+    def printed(answer: Answer) -> float:
+        return score_of_program(evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1)
 
-def convincing(found: Sequence[Answer], told: Sequence[Answer], *, needed: float | None) -> list[Answer]:
-    """Those of `told` that are answers: beyond noise by their bits, or, where a person asked, by the score
-    `needed`.
-
-    `found` are the same answers with the scores that they were found with, which must suffice as well: what
-    was not sure enough while more was known is none the surer.
-    """
-    if needed is None:
-        return [answer for answer in told if beyond_noise(answer.worth)]
-    return [
-        after
-        for before, after in zip(found, told, strict=True)
-        if before.score >= needed and after.score >= needed
-    ]
+    return [replace(one, score=printed(one)) if suffices(one, needed) else one for one in answers]
 
 
 def faint_note(answer: Answer, objects: int) -> str:

@@ -7,31 +7,27 @@ from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Drawn
-from p3i.search.forms.sketches import WALKED_SHAPES, Sketched, structure_of
+from p3i.search.forms.sketches import Sketched, structure_of
 from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.judge.table1 import in_table1
 from p3i.search.look.session import Session
 
-_FEWEST_RINGS = 2
-
 
 def answers_of(look: Session, sketch: Sketched, drawn: Drawn) -> list[Answer]:
     """What a drawn program is as an answer, worth what it explains; in Table 1's words where asked for."""
-    if sketch.by_hand is not None or sketch.shape in WALKED_SHAPES:
+    if sketch.gridded:
         return [_as_asked(look, drawn)]
-    answer = _free(look, sketch, drawn)
     if look.config.recipe == "paper":
-        return [answer]
+        score = score_of_program(look.evidence, drawn.program)
+        return [Answer(drawn.program, sketch.structure, score, drawn.fit.covered)]
+    answer = _free(look, sketch, drawn)
     written = in_table1(look, drawn.fit, answer) if look.config.strict else [answer]
     return [replace(one, worth=explained_bits(look.evidence, one)) for one in written]
 
 
 def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
     """The answer in whatever words say it best."""
-    if look.config.recipe == "paper":
-        score = score_of_program(look.evidence, drawn.program)
-        return Answer(drawn.program, sketch.structure, score, drawn.fit.covered)
     stated = sketch.structure == "lattice" or drawn.fit.focal_mm == look.evidence.focal_mm
     answer = Answer(
         drawn.program,
@@ -58,7 +54,7 @@ def _as_asked(look: Session, drawn: Drawn) -> Answer:
 
 
 def _without_empty_middle(look: Session, answer: Answer) -> Answer:
-    """The answer without its first rings as long as it explains more of the photo so.
+    """The answer without its first rings, down to two, as long as it explains more of the photo so.
 
     A first ring close to the centre has room for tiny patches only: where nothing is there, all lose by it.
     """
@@ -66,7 +62,7 @@ def _without_empty_middle(look: Session, answer: Answer) -> Answer:
     while True:
         numbers = leaves(answer.program)
         first, stop = numbers["for_i.start.1"], numbers["for_i.stop.1"]
-        if stop - first <= _FEWEST_RINGS:
+        if stop - first <= 2:
             return answer
         later = replace(answer, program=with_leaves(answer.program, {"for_i.start.1": first + 1}))
         more = explained_bits(look.evidence, later)

@@ -12,8 +12,6 @@ to be worth b bits by chance (Kraft's inequality, and Markov's). That is what ac
 What a person asked for (a sketch, a start, the paper's recipe) needs no bits.
 """
 
-from dataclasses import dataclass
-
 from p3i.interp.compile import compile
 from p3i.interp.pattern import without_doubles
 from p3i.search.answer import Answer
@@ -22,31 +20,14 @@ from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.forms.length import CAMERA_BITS, cost_bits
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import recurrence_bits
-from p3i.search.look.thinned import thinned
 from p3i.search.result import NEEDED_BITS
-
-# More objects than this are judged by a part of them.
-_MOST_JUDGED = 200
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Explained:
-    """What a program explains of a photo: `bits` net of its `cost`, negative where it costs more, by so many
-    `objects` in sight.
-    """
-
-    bits: float
-    cost: float
-    objects: int
 
 
 def explained_bits(evidence: Evidence, answer: Answer) -> float:
-    """What a program explains of the photo less what it costs, in bits; negative where it costs more."""
-    return explained(evidence, answer).bits
+    """What a program explains of the photo less what it costs, in bits; negative where it costs more.
 
-
-def explained(evidence: Evidence, answer: Answer) -> Explained:
-    """What a program explains of the photo; nothing where fewer than two of its objects are in sight."""
+    Fewer than two objects in sight explain nothing.
+    """
     pattern = without_doubles(compile(answer.program))
     cells = sweeps_cells(pattern)
     pattern = in_shortest_steps(pattern) if cells else pattern
@@ -54,10 +35,8 @@ def explained(evidence: Evidence, answer: Answer) -> Explained:
     index = pattern.index[evidence.in_sight(pattern, focal_mm=focal_mm)].double()
     cost = cost_bits(answer.program)
     if len(index) < 2:
-        return Explained(-cost, cost, len(index))
-    judged = index[thinned(index, _MOST_JUDGED)]
-    saved = recurrence_bits(evidence, pattern, judged, focal_mm=focal_mm, cells=cells)
-    return Explained(saved * len(index) / len(judged) - cost, cost, len(index))
+        return -cost
+    return recurrence_bits(evidence, pattern, index, focal_mm=focal_mm, cells=cells) - cost
 
 
 def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:

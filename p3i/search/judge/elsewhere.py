@@ -16,14 +16,12 @@ from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Fit
 from p3i.search.judge.accept import beyond_noise
-from p3i.search.judge.region import centers_px, region_px
+from p3i.search.judge.region import objects_px, region_px
 from p3i.search.look.cells import sample_points
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import Other
 
-# A fit lies elsewhere where most of its cells do: at most this share of them lies in an answer's region.
-_MOST_INSIDE = 0.5
 # Planes whose normals differ by more than this are two.
 _OTHER_PLANE_DEG = 8.0
 
@@ -42,7 +40,8 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     regions, others = [_polygon(evidence, first)], []
 
     def elsewhere(points: np.ndarray) -> bool:
-        return all(_inside(region, points) <= _MOST_INSIDE for region in regions)
+        """Whether at most half of the points [N, 2] lie in the region of any pattern that was met."""
+        return all(_inside(region, points) <= 1 / 2 for region in regions)
 
     def keep(other: Answer) -> None:
         if beyond_noise(other.worth) and elsewhere(_centers(evidence, other)):
@@ -105,8 +104,7 @@ def _polygon(evidence: Evidence, answer: Answer) -> np.ndarray:
 
 def _centers(evidence: Evidence, answer: Answer) -> np.ndarray:
     """The objects of an answer, [N, 2] pixels of what was looked at."""
-    focal_mm = answer.focal_mm or evidence.focal_mm
-    return np.array(centers_px(answer.program, evidence.image, focal_mm)).reshape(-1, 4)[:, :2]
+    return objects_px(answer, evidence.image, evidence.focal_mm)[:, :2]
 
 
 def _cells_px(evidence: Evidence, fit: Fit) -> np.ndarray:

@@ -3,12 +3,14 @@
 import cv2
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from p3i.grammar.ast import Program
 from p3i.interp import unroll
 from p3i.interp.camera import Camera, project
 from p3i.interp.compile import compile
 from p3i.interp.lens import photo_from_straight
+from p3i.search.answer import Answer
 from p3i.search.look.part import shown
 from p3i.search.look.patches import frames, spacing
 from p3i.size import Size
@@ -31,6 +33,13 @@ def centers_px(
         for place in unroll.distinct(points)
         if bool(inside[place])
     )
+
+
+def objects_px(answer: Answer, image: Image, assumed_mm: float) -> NDArray[np.float64]:
+    """The objects of an answer on the photo, `centers_px`, as an array [N, 4]: x, y, i, j."""
+    focal_mm = answer.focal_mm or assumed_mm
+    centers = centers_px(answer.program, image, focal_mm, lens_k1=answer.lens_k1)
+    return np.array(centers, float).reshape(-1, 4)
 
 
 def share_in_sight(program: Program, image: Image, focal_mm: float, *, lens_k1: float | None = None) -> float:

@@ -17,7 +17,7 @@ from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.spelled import ring_filling, rings_filling
-from p3i.search.judge.region import centers_px
+from p3i.search.judge.region import objects_px
 from p3i.search.look.session import Session
 from p3i.search.result import NEEDED
 
@@ -105,13 +105,10 @@ def _fitted(
     if start is None:
         return []
     moved = follow(evidence, start, rounds=_ROUNDS, free_focal=free.focal_mm is not None)
-    # As with hybrids: how surely it repeats may be told at another place than that of the draws.
-    score = max(curve_score(moved), free.score * min(1.0, moved.quality / max(fit.quality, 1e-9)))
     answer = replace(
         free,
         program=with_leaves(filling.program(moved.z, ()), bounds),
-        score=score,
-        worth=score,
+        score=curve_score(moved),
         focal_mm=None if free.focal_mm is None else round(moved.focal_mm, 2),
     )
     away = _median_px(look, answer, free)
@@ -121,11 +118,8 @@ def _fitted(
 
 def _median_px(look: Session, answer: Answer, free: Answer) -> float:
     """How far the objects of an answer on the photo typically lie from the nearest of another one's."""
-    image, assumed = look.evidence.image, look.evidence.focal_mm
-    ours, theirs = (
-        np.array(centers_px(one.program, image, one.focal_mm or assumed)).reshape(-1, 4)[:, :2]
-        for one in (answer, free)
-    )
+    evidence = look.evidence
+    ours, theirs = (objects_px(one, evidence.image, evidence.focal_mm)[:, :2] for one in (answer, free))
     if len(ours) == 0 or len(theirs) == 0:
         return 0.0
     return float(np.median(np.linalg.norm(ours[:, None] - theirs, axis=2).min(1)))

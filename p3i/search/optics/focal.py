@@ -28,7 +28,10 @@ from p3i.interp.compile import compile
 from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
+from p3i.search.fit.judged import MOST_JUDGED
+from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import in_shortest_steps
+from p3i.search.look.patches import frames, spacing, whitening
 from p3i.search.look.thinned import thinned
 from p3i.search.result import FOCAL_REASONS, FocalSource
 from p3i.size import Size
@@ -43,10 +46,6 @@ LEAST_MM, MOST_MM = 15.0, 200.0
 LEAST_SURE = 0.15
 """An estimate less sure than this (its standard deviation, as a share of the focal) is none."""
 
-# How well objects are placed: to this share of the step to the next, and to so many pixels in 640.
-_SHARE_NOISE = 0.03
-_PIXEL_NOISE = 0.5
-_MOST_POINTS = 200
 # How true people build: cells' angles to half a degree, equal sides to a hundredth.
 _ANGLE_SLACK = math.radians(0.5)
 _LENGTH_SLACK = 0.01
@@ -62,7 +61,6 @@ _FOCAL_SPREAD = 0.45
 _NOTHING_SEEN = 10.0
 # A reading must lead others, that give another focal, by this much.
 _LEAD = 1.0
-_SAME_FOCAL = 0.15
 # Sides of cells that a wrong focal may hide: whole combinations of the program's own steps, that first.
 _SIDES: tuple[tuple[Side, Side], ...] = (
     ((1, 0), (0, 1)),
@@ -72,8 +70,8 @@ _SIDES: tuple[tuple[Side, Side], ...] = (
     ((1, -1), (0, 1)),
 )
 _LEAST_RHOMBUS_DEG = 55.0
-# Enough digits that no point moves by a hundredth of a pixel: the angles and lengths of the new program.
-_ANGLE_DIGITS, _LENGTH_DIGITS = 4, 5
+# One digit more than an answer has, so that no point moves by a hundredth of a pixel.
+_ANGLE_DIGITS, _LENGTH_DIGITS = ANGLE_DIGITS + 1, LENGTH_DIGITS + 1
 
 _TOO_FLAT = "the pattern is seen too nearly straight on, or along one of its directions, to fix it"
 _SKEWED = "no focal between 15 and 200 mm makes the cell a rectangle, a hexagon or a rhombus"
@@ -126,7 +124,7 @@ def estimate_focal(program: Program, *, size: Size, focal_mm: float) -> FocalEst
         if other.spread > LEAST_SURE:
             continue
         apart = abs(other.log_focal - best.log_focal)
-        if other.against < best.against + _LEAD and apart > max(_SAME_FOCAL, 3 * best.spread):
+        if other.against < best.against + _LEAD and apart > max(LEAST_SURE, 3 * best.spread):
             which = " or ".join(f"a {one.shape} ({math.exp(one.log_focal):.0f} mm)" for one in (best, other))
             return FocalEstimate(None, f"the cell may be {which}")
     shares = f"give or take {max(1, round(100 * best.spread))} %"
@@ -281,26 +279,22 @@ def _angle_deg(pattern: Pattern, sides: tuple[Side, Side], log_squared: float) -
 def _covariance(pattern: Pattern, *, size: Size, focal_mm: float) -> Tensor | None:
     """How surely the photo fixes the numbers theta of a fit: [P, P]; None where it does not.
 
-    From the objects in sight, each taken to lie where it was found to within the noise above.
+    From the objects in sight, each taken to lie where it was found to within the noise of places.
     """
     points, in_front = pattern.centers_px(size=size, focal_mm=focal_mm)
     seen = in_front & in_frame(points, size)
     index = pattern.index[seen]
     if len(index) < 4:
         return None
-    index = index[thinned(index, _MOST_POINTS)]
+    index, theta = index[thinned(index, MOST_JUDGED)].double(), pattern.theta
 
-    def pixels(theta: Tensor, at: Tensor = index) -> Tensor:
+    def pixels(theta: Tensor) -> Tensor:
         matrix = pattern.image_from_plane(theta, size=size, focal_mm=focal_mm)
-        return project(matrix, pattern.points_at(at, theta))[0]
+        return project(matrix, pattern.points_at(index, theta))[0]
 
-    here = pixels(pattern.theta)
-    step = torch.stack(
-        [(pixels(pattern.theta, index + torch.tensor(one)) - here).norm(dim=1) for one in ((1, 0), (0, 1))]
-    ).amin(0)
-    noise = ((_SHARE_NOISE * step) ** 2 + (_PIXEL_NOISE * size.longer / 640) ** 2).sqrt()
-    jacobian = torch.func.jacfwd(pixels)(pattern.theta) / noise[:, None, None]
-    rows = jacobian.reshape(-1, len(pattern.paths))
+    matrix = pattern.image_from_plane(theta, size=size, focal_mm=focal_mm)
+    whiten = whitening(matrix, frames(pattern, theta, index, side=spacing(pattern, theta)))
+    rows = (whiten @ torch.func.jacfwd(pixels)(theta)).reshape(-1, len(theta))
     normal = rows.T @ rows
     scale = normal.diagonal().clamp(min=1e-12).rsqrt()
     even = normal * scale[:, None] * scale

@@ -121,7 +121,7 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
         focal_mm = math.exp(fit.number("focal")) if free_focal else answer.focal_mm
         start = _on_photo(seen, dataclasses.replace(best, program=fit.program(), focal_mm=focal_mm))
         seen = straightened(evidence.image, now)
-        straight, start = seen.looked_at(evidence), _on_canvas(seen, start)
+        straight, start = seen.looked_at(evidence), _rescaled(start, 1 / seen.scale)
         found = finish(straight, start) if answer.structure == "lattice" else _followed(straight, start)
         if found is None:
             return answer
@@ -142,9 +142,8 @@ def _with_lens(session: Session, answer: Answer, finish: Finish) -> Answer:
 
 def _followed(evidence: Evidence, answer: Answer) -> Answer | None:
     """A ring or hybrid on a straightened photo, fitted from where it is, and worth what it explains there."""
-    whole = whole_filling(answer.program)
-    assert whole is not None
-    start = measured(evidence, *whole, focal_mm=answer.focal_mm or evidence.focal_mm)
+    focal_mm = answer.focal_mm or evidence.focal_mm
+    start = measured(evidence, *whole_filling(answer.program), focal_mm=focal_mm)
     if start is None:
         return None
     fit = follow(evidence, start, rounds=3, free_focal=tells_focal(answer))
@@ -160,12 +159,10 @@ def _noted(answer: Answer, told: LensTold) -> Answer:
 
 def _on_photo(seen: Straightened, answer: Answer) -> Answer:
     """An answer on the straightened photo, in units of the photo's canvas, with its k1."""
-    focal_mm = None if answer.focal_mm is None else answer.focal_mm * seen.scale
-    program = scaled(answer.program, seen.scale)
-    return dataclasses.replace(answer, program=program, focal_mm=focal_mm, lens_k1=seen.k1)
+    return dataclasses.replace(_rescaled(answer, seen.scale), lens_k1=seen.k1)
 
 
-def _on_canvas(seen: Straightened, answer: Answer) -> Answer:
-    """An answer in units of the photo's canvas in those of the straightened one."""
-    focal_mm = None if answer.focal_mm is None else answer.focal_mm / seen.scale
-    return dataclasses.replace(answer, program=scaled(answer.program, 1 / seen.scale), focal_mm=focal_mm)
+def _rescaled(answer: Answer, factor: float) -> Answer:
+    """The answer in units of a canvas `factor` times as small."""
+    focal_mm = None if answer.focal_mm is None else answer.focal_mm * factor
+    return dataclasses.replace(answer, program=scaled(answer.program, factor), focal_mm=focal_mm)

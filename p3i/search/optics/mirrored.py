@@ -21,21 +21,16 @@ from p3i.search.fit.places import measured, numbers_of, registered, values_of
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.whole import whole_filling
 from p3i.search.look.evidence import Evidence
+from p3i.search.optics.tilt import TOLD_DEG
 from p3i.size import Size
 
 Array = NDArray[np.float64]
 
-# Poses that lie no further apart are one.
-_SAME_DEG = 5.0
 # The objects tell the poses apart where the misfit is so much larger: by its logarithm, times the objects (an
-# F-test), and as a logarithm of likelihoods under the noise that places have;
-# or where they agree less than this share of what they do under the answer.
+# F-test), and as a logarithm of likelihoods under the noise that places have.
 _TELLS = 6.0
-_AS_ALIKE = 0.9
 _LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
 _ROUNDS = 2
-# Of more objects no tilt is in doubt.
-_MOST_OBJECTS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +49,7 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
     values = leaves(answer.program)
     if values.get("draw.x.angle.j", 0.0) == 0.0 or "draw.y.angle.j" not in values:
         return None
-    whole = whole_filling(answer.program)
-    if whole is None or len(whole[0].pattern.index) > _MOST_OBJECTS:
-        return None
-    filling, as_written = whole
+    filling, as_written = whole_filling(answer.program)
     focal_mm = answer.focal_mm or evidence.focal_mm
     camera = Camera.of(answer.program, focal_mm=focal_mm)
     own = _fit(evidence, filling, as_written, focal_mm)
@@ -72,7 +64,7 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
     apart = math.degrees(math.acos(min(1.0, abs(float(np.dot(found.normal, camera.normal))))))
     ours, theirs = (min(fit.cost, _WORST_MISFIT) + _LEAST_MISFIT for fit in (own, other))
     told = len(own.contrast) * min(math.log(theirs / ours), 2 * (theirs - ours))
-    if apart < _SAME_DEG or told > _TELLS or other.mean < _AS_ALIKE * own.mean:
+    if apart < TOLD_DEG or told > _TELLS:
         return None
     return found
 

@@ -41,10 +41,9 @@ def as_precise_as_fitted(evidence: Evidence, answer: Answer) -> Answer:
     evidence = evidence.under(answer.focal_mm or evidence.focal_mm)
     free, program = without_lens(evidence, answer.program, answer.lens_k1)
     known = covariance_of_program(free, program)
-    whole = whole_filling(answer.program)
-    if known is None or whole is None:
+    if known is None:
         return answer
-    filling, numbers = whole
+    filling, numbers = whole_filling(answer.program)
     size, focal_mm = evidence.image.size, evidence.focal_mm
     # The lens straightens the photo on a larger canvas: what is a length there is shorter in the program.
     lengths = torch.tensor([0.0 if _is_angle(one.name) else 1.0 for one in filling.moving]).double()

@@ -27,24 +27,6 @@ def fit_of(evidence: Evidence, lattice: Lattice) -> Fit:
     return replace(fit, contrast=torch.ones(len(fit.index)))
 
 
-@pytest.mark.parametrize("factors", [[[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]], [[2, 0], [0, 2]]])
-def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]]) -> None:
-    scene = small_scene(16)
-    truth = Lattice.of(PATTERN, true_theta(scene))
-    multiple = truth.with_basis(np.array(factors) @ truth.basis)
-    ground = fit_of(evidence_of(scene), multiple)
-    own = index_in(scene).numpy()
-    steps = ground.index.numpy() @ factors
-    inside = torch.from_numpy(((steps > own.min(0)) & (steps < own.max(0))).all(1))
-    ground = replace(ground, index=ground.index[inside], contrast=ground.contrast[inside])
-    theta, index = primitive(evidence_of(scene), PATTERN, ground)[-1]
-    assert lattice_error(Lattice.of(PATTERN, theta).basis, truth.basis) < 1e-6
-    # The new cells lie on the ground of the old ones, all of it.
-    determinant = abs(np.linalg.det(factors))
-    assert len(index) == round(determinant * len(ground.index))
-    assert len({tuple(cell) for cell in index.tolist()}) == len(index)
-
-
 @pytest.mark.parametrize("seed", [1, 14, 18])
 def test_the_true_cell_is_its_own(seed: int) -> None:
     scene = small_scene(seed)

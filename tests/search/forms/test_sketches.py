@@ -1,49 +1,52 @@
-"""The enumerator: which sketches there are, and which a search takes up."""
+"""Which sketches there are, and what a search takes up."""
 
-import itertools
-
-from p3i.grammar.departures import departures
 from p3i.grammar.sketch import Sketch, format_sketch, parse_sketch
 from p3i.search.config import SearchConfig
-from p3i.search.forms.length import NUMBER_BITS
-from p3i.search.forms.sketches import sketches, sketches_by_length, structure_of
+from p3i.search.forms.length import NUMBER_BITS, PRODUCTION_BITS
+from p3i.search.forms.sketches import every_sketch, sketches
+from p3i.search.forms.spelled import lattice_filling, ring_filling, rings_filling
 from p3i.search.propose.proposers import proposers
 
 
-def test_sketches_come_the_shortest_first_and_each_once() -> None:
-    every = list(sketches_by_length())
-    assert [one.bits for one in every] == sorted(one.bits for one in every)
+def test_each_shape_is_spelled_once() -> None:
+    every = every_sketch()
     texts = [format_sketch(one.sketch) for one in every]
     assert len(set(texts)) == len(texts)
-    assert len({one.name for one in every}) == len(every)
+    assert len({one.name for one in every}) == len({one.shape for one in every}) == len(every)
 
 
-def test_a_sketch_has_the_structure_that_its_text_spells() -> None:
-    for one in sketches_by_length():
-        assert one.structure == structure_of(one.sketch.template), one.name
+def test_a_sketch_has_the_structure_of_its_shape() -> None:
+    structures = {one.shape: one.structure for one in every_sketch()}
+    assert structures == {
+        "lattice": "lattice", "ring": "circular", "arc": "circular",
+        "rings in rings": "hybrid", "fan": "hybrid", "rings in a row": "hybrid",
+        "row": "lattice", "spiral": "circular",
+    }  # fmt: skip
 
 
-def outside_table1(sketch: Sketch) -> bool:
-    """Whether its numbers leave Table 1, by the language's own check; how a count is spelt may be mended."""
-    return any("Rotate2Stmt" not in found.message for found in departures(sketch.template))
+def test_what_proposers_write_of_a_shape_is_its_sketch_but_for_bounds_and_guards() -> None:
+    said = {
+        "lattice": lattice_filling(),
+        "ring": ring_filling(7),
+        "arc": ring_filling(0, drawn=7),
+        "rings in rings": rings_filling(0, 3, 5, fan=False, grows=True, moves=False),
+        "fan": rings_filling(1, 3, 5, fan=True, grows=True, moves=False),
+        "rings in a row": rings_filling(0, 3, 5, fan=False, grows=False, moves=True),
+    }
+    for one in every_sketch():
+        if one.shape in said:
+            paths = {hole.path for hole in one.sketch.holes if hole.path.startswith(("camera.", "draw."))}
+            closed = "ring" in one.shape
+            counted = {f"draw.{axis}.angle.j" for axis in "xy"} if closed else set()
+            assert {path for free in said[one.shape].moving for path in free.paths} == paths - counted
 
 
-def test_table1_is_walked_before_what_it_cannot_say_with_as_many_numbers() -> None:
-    compared = 0
-    for one, other in itertools.permutations(sketches_by_length(), 2):
-        numbers, others = (
-            len({hole.name or hole.path for hole in each.sketch.holes}) for each in (one, other)
-        )
-        if numbers == others and outside_table1(other.sketch) and not outside_table1(one.sketch):
-            compared += 1
-            assert one.bits < other.bits, (one.name, other.name)
-    assert compared > 3
-
-
-def test_the_length_is_of_the_holes_that_the_text_has() -> None:
-    for one in sketches_by_length():
+def test_the_length_is_of_the_holes_and_productions_that_the_text_has() -> None:
+    for one in every_sketch():
         numbers = len({hole.name or hole.path for hole in one.sketch.holes})
-        assert 0 <= one.bits - NUMBER_BITS * numbers < 35, one.name
+        lines, text = len(format_sketch(one.sketch).splitlines()[1:]), format_sketch(one.sketch)
+        curved = text.count("Cos") + text.count("Sin")
+        assert one.bits == NUMBER_BITS * numbers + PRODUCTION_BITS * (lines + curved), one.name
 
 
 def test_a_search_takes_up_each_shape_once_and_starts_with_lattices() -> None:
@@ -58,7 +61,7 @@ def test_rows_and_spirals_are_walked_last_and_only_where_somebody_asks() -> None
 
 def test_every_shape_has_a_proposer() -> None:
     written = frozenset().union(*(proposer.writes for proposer in proposers(SearchConfig())))
-    assert written >= {one.shape for one in sketches_by_length()}
+    assert written >= {one.shape for one in every_sketch()}
 
 
 def test_hybrids_start_from_rings_that_are_no_answers() -> None:

@@ -3,14 +3,19 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from p3i.language import loads
 from p3i.search.answer import Answer
-from p3i.search.judge.accept import beyond_noise, convincing, false_alarms
+from p3i.search.config import SearchConfig
+from p3i.search.judge import accept
+from p3i.search.judge.accept import beyond_noise, false_alarms, suffices, with_printed_scores
+from p3i.search.look.evidence import Evidence
 from p3i.search.result import MOST_FALSE_ALARMS, NEEDED, StructureFound
+from p3i.vision.image import Image
 
 PROGRAM = loads("SetCameraPose(rx=1, ry=2)\nfor i in range(0, 9):\n    Draw(x=9*i, y=0)\n")
 ENOUGH = -math.log2(MOST_FALSE_ALARMS)
@@ -44,10 +49,18 @@ def test_a_find_beyond_all_numbers_has_no_false_alarms() -> None:
 @pytest.mark.parametrize("structure", ["lattice", "circular", "hybrid"])
 def test_one_rule_serves_all_structures_whatever_their_score(structure: StructureFound) -> None:
     sure, poor = (answer(structure, score=0.01, bits=ENOUGH + by) for by in (0.1, -0.1))
-    assert convincing([poor, sure], [poor, sure], needed=None) == [sure]
+    assert suffices(sure, None) and not suffices(poor, None)
 
 
-def test_what_was_asked_for_must_reach_the_score_before_and_after_and_needs_no_bits() -> None:
+@pytest.mark.parametrize(("printed", "enough"), [(NEEDED + 0.02, True), (NEEDED / 2, False)])
+def test_what_was_asked_for_must_reach_the_score_before_and_after_and_needs_no_bits(
+    monkeypatch: pytest.MonkeyPatch, printed: float, enough: bool
+) -> None:
+    monkeypatch.setattr(accept, "score_of_program", lambda *_, **__: printed)
     sure = answer(score=NEEDED + 0.01, bits=-50)
     lower = replace(sure, score=NEEDED / 2)
-    assert convincing([sure, lower, sure], [sure, sure, lower], needed=NEEDED) == [sure]
+    image = Image(np.zeros((40, 40, 3), np.float32), np.ones((40, 40), bool))
+    evidence = Evidence(image, SearchConfig(), 35.0)
+    told = with_printed_scores(evidence, [sure, lower], needed=NEEDED)
+    assert [one.score for one in told] == [printed, lower.score]
+    assert [suffices(one, NEEDED) for one in told] == [enough, False]

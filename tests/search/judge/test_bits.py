@@ -12,10 +12,11 @@ from p3i.evaluation.scene import Scene
 from p3i.grammar.ast import Program
 from p3i.grammar.leaves import leaves
 from p3i.grammar.parser import parse
+from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.forms.length import cost_bits
-from p3i.search.judge.bits import explained, explained_bits
+from p3i.search.judge.bits import explained_bits
 from p3i.search.look.evidence import Evidence
 
 RING = DrawnRing()
@@ -117,6 +118,7 @@ def test_what_two_kinds_of_columns_explain_does_not_depend_on_their_number() -> 
     each: list[float] = []
     for rows, columns in ((16, 16), (18, 18), (17, 22)):
         image, lattice = two_kinds_of_columns(rows, columns)
-        found = explained(Evidence(image, SearchConfig(), 35.0), answer(lattice))
-        each.append((found.bits + found.cost) / found.objects)
+        evidence = Evidence(image, SearchConfig(), 35.0)
+        objects = int(evidence.in_sight(compile(lattice)).sum())
+        each.append((explained_bits(evidence, answer(lattice)) + cost_bits(lattice)) / objects)
     assert each[1:] == pytest.approx([each[0]] * 2, rel=0.1)

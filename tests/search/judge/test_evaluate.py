@@ -15,7 +15,8 @@ from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.judge.bits import explained
+from p3i.search.forms.length import cost_bits
+from p3i.search.judge.bits import explained_bits
 from p3i.search.judge.evaluate import evaluate
 from p3i.search.look.contrast import score_of
 from p3i.search.look.evidence import Evidence
@@ -60,8 +61,8 @@ def test_a_score_is_of_the_objects_whatever_steps_they_are_written_in() -> None:
     scores = [evaluate(scene.image(), program, CONFIG).agreement for program in (whole, other)]
     assert scores[0] == pytest.approx(scores[1], abs=1e-6)
     told = [Answer(program, "lattice", 1.0, 0.0) for program in (whole, other)]
-    bits = [explained(evidence_of(scene), answer) for answer in told]
-    assert bits[0].bits + bits[0].cost == pytest.approx(bits[1].bits + bits[1].cost)
+    bits = [explained_bits(evidence_of(scene), one) + cost_bits(one.program) for one in told]
+    assert bits[0] == pytest.approx(bits[1])
 
 
 def test_a_shifted_program_scores_as_high_but_one_at_twice_the_step_does_not() -> None:

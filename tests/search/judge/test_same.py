@@ -2,15 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from p3i.grammar.ast import Affine, CameraPose, Draw, For, Polar, Program
 from p3i.search.answer import Answer
 from p3i.search.judge.same import distinct_answers
 from p3i.search.optics.focal import refocused
-from p3i.size import Size
+from p3i.vision.image import Image
 
-SIZE = Size(640, 480)
+PHOTO = Image(np.zeros((480, 640, 3), np.float32), np.ones((480, 640), bool))
 
 
 def lattice(u: tuple[float, float], v: tuple[float, float], count: int = 7, shift: float = 0.0) -> Program:
@@ -28,7 +29,7 @@ def ring(count: int) -> Program:
 
 def kept(*programs: Program) -> list[int]:
     answers = [Answer(program, "lattice", 0.5, 1.0) for program in programs]
-    found = distinct_answers(answers, size=SIZE, focal_mm=35.0)
+    found = distinct_answers(answers, image=PHOTO, focal_mm=35.0)
     return [answers.index(one) for one in found]
 
 
@@ -76,7 +77,7 @@ def test_rings_of_another_count_differ_and_of_another_start_do_not() -> None:
 def test_a_program_told_with_another_focal_is_the_same() -> None:
     told = refocused(SQUARE, from_mm=35, to_mm=60)
     answers = [Answer(SQUARE, "lattice", 0.5, 1.0), Answer(told, "lattice", 0.5, 0.9, focal_mm=60.0)]
-    assert distinct_answers(answers, size=SIZE, focal_mm=35.0) == answers[:1]
+    assert distinct_answers(answers, image=PHOTO, focal_mm=35.0) == answers[:1]
 
 
 def test_programs_that_draw_nothing_in_sight_all_mean_the_same() -> None:

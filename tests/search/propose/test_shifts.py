@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from p3i.search.forms.lattice import reduce_basis
-from p3i.search.propose.shifts import Autocorrelation, autocorrelation, best_pair, valley_contrast
+from p3i.search.propose.shifts import Autocorrelation, _divided, autocorrelation, best_pair, valley_contrast
 
 
 def view_of(seed: int, *, height: int = 20, width: int = 24, channels: int = 3) -> np.ndarray:
@@ -104,6 +104,14 @@ def test_the_pair_of_a_lattice_is_its_basis(basis: list[list[float]]) -> None:
     assert pair is not None
     np.testing.assert_allclose(reduce_basis(pair.basis), reduce_basis(steps), atol=0.3)
     assert pair.worth > 0.5
+
+
+@pytest.mark.parametrize("factors", [[[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]], [[2, 0], [0, 2]]])
+def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]]) -> None:
+    steps = np.array([[14.0, 3.0], [8.0, 15.0]])
+    found = autocorrelation(dots(steps), np.ones((128, 128), np.float32))
+    basis = _divided(found, np.array(factors) @ steps, least=4)
+    np.testing.assert_allclose(reduce_basis(basis), reduce_basis(steps), atol=0.3)
 
 
 def test_steps_shorter_or_longer_than_asked_for_are_not_taken() -> None:
