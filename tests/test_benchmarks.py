@@ -13,9 +13,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import torch
 
 import p3i
+from p3i.interp.camera import Camera, project
 from p3i.search.result import StopReason, SynthesisResult
+from p3i.size import Size
 from p3i.vision.image import Image
 
 SCRIPTS = sorted((Path(__file__).parent.parent / "benchmarks").glob("*.py"))
@@ -136,3 +139,23 @@ def test_what_is_answered_of_pattern_free_crops_is_told_with_its_bits(
     told = capsys.readouterr().out
     assert "2 of 3 refused (66.7%)" in told and "answered: 80" in told and "refused: 12" in told
     assert len((tmp_path / "out.jsonl").read_text().splitlines()) == 3
+
+
+def test_the_textures_lie_where_their_annotation_says() -> None:
+    textures = runpy.run_path(str(next(path for path in SCRIPTS if path.stem == "textures")))
+    dots = np.full((120, 120, 3), 40, np.uint8)
+    for x in range(15, 120, 30):
+        for y in range(15, 120, 30):
+            cv2.circle(dots, (x, y), 8, (230, 230, 230), -1)
+    told, black = textures["Texture"](4, 4), np.zeros((700, 900, 3), np.uint8)
+    picture, truth = textures["scene"](dots, told, black, np.random.default_rng(4))
+    centers, size = np.array(truth["centers"]), Size(truth["width"], truth["height"])
+    assert len(centers) > 20 and picture.shape[:2] == (size.height, size.width)
+    grey = picture.mean(2)
+    at = [grey[int(y), int(x)] for x, y in np.floor(centers)]
+    assert np.median(at) > 1.5 * np.median(grey[grey > 20])
+    camera = Camera(truth["pose"]["rx"], truth["pose"]["ry"], 35.0)
+    plane, _ = project(torch.linalg.inv(camera.image_from_plane(size)), torch.from_numpy(centers))
+    lattice = truth["lattice"]
+    steps = (plane.numpy() * size.unit_px - lattice["base"]) @ np.linalg.inv([lattice["u"], lattice["v"]])
+    assert np.allclose(steps, np.round(steps), atol=1e-6)

@@ -24,4 +24,6 @@ def with_slopes(
     nudges = torch.cat([torch.zeros_like(numbers)[None], nudges, -nudges])
     seen = points_of(numbers + nudges)
     points, (ahead, behind) = seen[0], seen[1:].chunk(2)
-    return points, ((ahead - behind) / (2 * _NUDGE)).permute(1, 2, 0)
+    # A number that is held has no slope, not the last bits in which equal points of a batch may differ.
+    slopes = (ahead - behind) / (2 * _NUDGE) * (limits != 0)[:, None, None]
+    return points, slopes.permute(1, 2, 0)

@@ -81,15 +81,15 @@ def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
 def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
     """For each of `own` [N, ...] the weighted mean of all others, by sample.
 
-    `known` says which samples count, in as many dimensions; `weights` [N]. Where no other is known, the mean
-    of all.
+    `known` says which samples count, in as many dimensions; `weights` [N]. 0 where no other is known: what is
+    alone agrees with nothing.
     """
     weight = known * weights.to(own).reshape(-1, *[1] * (own.dim() - 1))
     total = weight.sum(0, keepdim=True)
     mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
     rest = total - weight
     others = (mean * total - weight * own) / rest.clamp(min=1e-6)
-    return torch.where(rest > 1e-3, others, mean)
+    return torch.where(rest > 1e-3, others, 0.0)
 
 
 def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:

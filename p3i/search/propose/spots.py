@@ -48,7 +48,7 @@ class _Spots:
 def circles(evidence: Evidence, generator: np.random.Generator) -> list[tuple[Camera, Array]]:
     """The circles through spots that look alike, the most telling first: two for each ellipse.
 
-    Each is a camera that sees it straight on, and its centre in photo pixels.
+    Each is a camera that sees it straight on, and its centre [2] in photo pixels.
     """
     colours = evidence.colours_for(evidence.part.size.longer / LONGER)
     lab, map_from_photo = colours.lab, colours.map_from_photo.numpy()

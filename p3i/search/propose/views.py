@@ -80,7 +80,10 @@ class GradientView:
 
 
 def gradient_view(colours: ColourMap, map_from_plane: Array, *, side: int) -> GradientView | None:
-    """The gradients of a map on a canvas of `side` pixels; None where none of the plane shows."""
+    """The gradients of a map on a canvas of `side` pixels; None where none of the plane shows.
+
+    `map_from_plane` is [3, 3].
+    """
     height, width = colours.valid.shape
     canvas = view_canvas(map_from_plane, Size(width, height), side=side, depth_range=_DEPTH_RANGE)
     if canvas is None:
