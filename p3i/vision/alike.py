@@ -107,19 +107,24 @@ def _agreed_cell(
     shown = visible > 0.3
     weights = weights * shown
     fit, level = np.zeros(len(cells), np.float32), 0.0
-    trust = (0.1 + 0.9 * where).ravel()
-    template = weighted_mean(cells, known, weights * trust)
+    sure = _trusted(weights, where)
+    template = weighted_mean(cells, known, sure)
     for _ in range(_ROUNDS):
         fit = agreement(cells, known, template[None])[:, 0] * shown
-        sure = weights * trust
         level = float((sure * fit).sum() / max(float(sure.sum()), 1e-6))
         if level <= 0:
             break
         weights = np.clip((fit / level - 0.4) / 0.6, 0, 1) * visible * shown
-        where = np.maximum(where, np.clip(2 * cv2.blur((weights * trust).reshape(where.shape), (3, 3)), 0, 1))
-        trust = (0.1 + 0.9 * where).ravel()
-        template = weighted_mean(cells, known, weights * trust)
+        near = cv2.blur(_trusted(weights, where).reshape(where.shape), (3, 3))
+        where = np.maximum(where, np.clip(2 * near, 0, 1))
+        sure = _trusted(weights, where)
+        template = weighted_mean(cells, known, sure)
     return template, fit, weights, level
+
+
+def _trusted(weights: Floats, where: Floats) -> Floats:
+    """The weights [N] of cells as far as the pattern is thought to be there, `where` [rows, columns]."""
+    return (weights * (0.1 + 0.9 * where).ravel()).astype(np.float32)
 
 
 def _second_kind(
