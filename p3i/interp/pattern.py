@@ -13,7 +13,7 @@ place and nothing branches on a value, so torch.func.vmap and jacfwd go through.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -31,7 +31,9 @@ class Pattern:
 
     `paths` [P] names each number of theta (`camera.rx`, `camera.ry`, `draw.x.i`, ...: see grammar/leaves.py);
     `theta` [P] float64 holds the program's own values; `index` [N, 2] int64 the live (i, j) in the order of
-    the loops; `edges` [E, 2] int64 the neighbours of equation 2, as positions in `index`.
+    the loops; `edges` [E, 2] int64 the neighbours of equation 2, as positions in `index`. `upright`: what is
+    drawn on a curve keeps its direction, as the gondolas of a wheel do, and does not turn with the curve; that
+    is nothing that a program says, but how a photo is read by it.
     """
 
     program: Program
@@ -39,6 +41,7 @@ class Pattern:
     theta: Tensor
     index: Tensor
     edges: Tensor
+    upright: bool = False
 
     @property
     def turning(self) -> int | None:
@@ -110,10 +113,5 @@ def without_doubles(pattern: Pattern) -> Pattern:
     if len(kept) == len(centers):
         return pattern
     live = [tuple(pair) for pair in pattern.index[kept].tolist()]
-    return Pattern(
-        pattern.program,
-        pattern.paths,
-        pattern.theta,
-        pattern.index[kept],
-        torch.tensor(edges(live), dtype=torch.int64).reshape(-1, 2),
-    )
+    neighbours = torch.tensor(edges(live), dtype=torch.int64).reshape(-1, 2)
+    return replace(pattern, index=pattern.index[kept], edges=neighbours)

@@ -1,27 +1,50 @@
 """From a ring that was fitted to a program: where on it the objects are."""
 
+import itertools
 import math
 
 import numpy as np
 
+from p3i.search.extent.centring import centred, standing_out
 from p3i.search.extent.sector import Place, Ring, places
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
 from p3i.search.fit.saved import saved_bits
+from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 
 # So many radii are tried for the objects.
 _MOST_PLACES = 2
+# Shifts at which upright objects are looked at, in steps of the ring.
+_SHIFTS = (-0.25, 0.0, 0.25)
 
 
 def drawn_ring(look: Session, fit: Fit) -> Drawn:
     """The ring with its draws put where the objects sit: at the radius that explains most."""
+    if fit.pattern.upright:
+        fit = _upright(look.evidence, fit)
+        return Drawn(fit.program(), fit, curve_score(fit))
     found, most = fit, -math.inf
     for place in places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]:
         moved = _moved(look, fit, place)
         if moved is not None and (bits := saved_bits(look.evidence, moved)) > most:
             found, most = moved, bits
     return Drawn(found.program(), found, curve_score(found))
+
+
+def _upright(evidence: Evidence, fit: Fit) -> Fit:
+    """The fit of upright objects with its draws on their middles.
+
+    Such objects are alike at every point that they share, so that the whole ring may lie beside their
+    middles: it is moved to where they stand out most.
+    """
+    values, found = values_of(fit), [fit]
+    for right, down in itertools.product(_SHIFTS, repeat=2):
+        x, y = values["draw.x.offset.1"] + right * fit.side, values["draw.y.offset.1"] + down * fit.side
+        z = numbers_of(fit.filling, values | {"draw.x.offset.1": x, "draw.y.offset.1": y})
+        moved = measured(evidence, fit.filling, z, focal_mm=fit.focal_mm, side=fit.side)
+        found += [] if moved is None else [moved]
+    return centred(evidence, max(found, key=lambda one: standing_out(evidence, one)))
 
 
 def _moved(look: Session, fit: Fit, place: Place) -> Fit | None:

@@ -5,6 +5,7 @@ import numpy as np
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import fitted, measured, numbers_of, values_of
+from p3i.search.forms.filling import Filling, standing
 from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.session import Session
 
@@ -26,10 +27,14 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
     first, length = _best_run(fit)
     if length >= (1 - _MOST_LACKING) * count:
         return fit
+
+    def of(slots: int, *, drawn: int | None = None) -> Filling:
+        return standing(ring_filling(slots, drawn=drawn), upright=fit.pattern.upright)
+
     values = values_of(fit)
     step = 360 / count
     values |= {"draw.x.angle.j": step, "draw.x.angle.1": values["draw.x.angle.1"] + first * step}
-    filling = ring_filling(0, drawn=max(length, FEWEST_OBJECTS))
+    filling = of(0, drawn=max(length, FEWEST_OBJECTS))
     arc = fitted(look, filling, values, focal_mm=fit.focal_mm, rounds=2)
     if arc is None:
         return fit
@@ -38,10 +43,10 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
         step = values["draw.x.angle.j"]
         slots = round(360 / abs(step))
         if drawn >= slots - 1 or slots > 60:
-            closed = fitted(look, ring_filling(slots), values, focal_mm=arc.focal_mm, rounds=3)
+            closed = fitted(look, of(slots), values, focal_mm=arc.focal_mm, rounds=3)
             return closed if closed is not None and closed.quality > 0.7 * arc.quality else arc
         values["draw.x.angle.1"] -= _REACH * step
-        filling = ring_filling(0, drawn=drawn + 2 * _REACH)
+        filling = of(0, drawn=drawn + 2 * _REACH)
         wider = measured(
             look.evidence, filling, numbers_of(filling, values), focal_mm=arc.focal_mm, side=arc.side
         )
@@ -51,7 +56,7 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
         if length <= drawn:
             return arc
         values["draw.x.angle.1"] += first * step
-        filling = ring_filling(0, drawn=length)
+        filling = of(0, drawn=length)
         grown = fitted(look, filling, values, focal_mm=arc.focal_mm, rounds=2)
         if grown is None or grown.quality < 0.5 * arc.quality:
             return arc

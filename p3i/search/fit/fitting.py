@@ -1,19 +1,23 @@
 """One fit for every guess: over the cells of a lattice, over patches about the draws of anything else."""
 
+from dataclasses import replace
+
 import torch
 
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.arc import as_far_as_it_goes
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import grow
-from p3i.search.fit.places import curve_score, follow, measured, settled
+from p3i.search.fit.places import follow, measured, settled
 from p3i.search.fit.rings import says_more
+from p3i.search.fit.saved import saved_bits
 from p3i.search.fit.within import followed_within
-from p3i.search.forms.filling import with_settings
+from p3i.search.forms.filling import standing, with_settings
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.patches import spacing
 from p3i.search.look.session import Session
+from p3i.search.look.upright import as_it_stands
 
 _ROUNDS, _ROUNDS_WITHIN = 4, 3
 # A guess that says more than what it began with must be as sure as this share of it before it is fitted.
@@ -46,13 +50,32 @@ def fit_places(look: Session, guess: Guess) -> Fit | None:
         return followed_within(look.evidence, filling, guess.z, rounds=_ROUNDS_WITHIN)
     if guess.base is None:
         start = measured(look.evidence, guess.filling, guess.z, focal_mm=guess.focal_mm)
-        return None if start is None else as_far_as_it_goes(look, settled(look, start, rounds=_ROUNDS))
+        return None if start is None else _ring(look, start)
     # Where the rings of a fan lie far apart, patches as wide as its draws do are too wide for its inner ring.
     side = min(spacing(guess.filling.pattern, guess.theta), guess.base.side)
     start = measured(look.evidence, guess.filling, guess.z, focal_mm=guess.focal_mm, side=side)
     if start is None or start.mean < _LEAST_SHARE * guess.base.mean:
         return None
     return follow(look.evidence, start, rounds=3, free_focal=look.focal_is_free, keep_side=True)
+
+
+def _ring(look: Session, start: Fit) -> Fit:
+    """A ring fitted from a start, its objects turned with it, or upright where they save more so."""
+    starts = [start]
+    if _stands_upright(look, start):
+        filling = standing(start.filling, upright=True)
+        upright = measured(look.evidence, filling, start.z, focal_mm=start.focal_mm)
+        starts += [] if upright is None else [upright]
+    rings = [as_far_as_it_goes(look, settled(look, one, rounds=_ROUNDS)) for one in starts]
+    told = [replace(ring, bits=saved_bits(look.evidence, ring)) for ring in rings]
+    return max(told, key=worth)
+
+
+def _stands_upright(look: Session, fit: Fit) -> bool:
+    pattern, _ = as_it_stands(
+        look.evidence, fit.pattern, fit.index, focal_mm=fit.focal_mm, theta=fit.theta
+    )
+    return pattern.upright
 
 
 def holds(fit: Fit, guess: Guess) -> bool:
@@ -71,7 +94,7 @@ def worth(fit: Fit) -> float:
         return fit.covered
     if fit.filling is not lattice_filling():
         rings = len(fit.index[:, 0].unique())
-        return curve_score(fit) if rings == 1 else fit.mean * len(fit.contrast)
+        return fit.bits if rings == 1 else fit.mean * len(fit.contrast)
     contrast = fit.contrast[fit.support]
     count = len(contrast)
     if count < FEWEST_OBJECTS:

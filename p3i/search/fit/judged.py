@@ -34,6 +34,7 @@ from p3i.search.look.patches import (
     whitening,
 )
 from p3i.search.look.thinned import thinned
+from p3i.search.look.upright import as_it_stands
 
 MOST_JUDGED = 600
 """More objects than this are not needed to judge a program."""
@@ -130,6 +131,9 @@ def judged_patches(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedPatch
     Places that fewer than three draws show are left out.
     """
     focal_mm = evidence.focal_mm
+    if pattern.turning is not None:
+        drawn = pattern.index[evidence.in_sight(pattern)].double()
+        pattern, _ = as_it_stands(evidence, pattern, drawn, focal_mm=focal_mm)
     for theta in _places(pattern):
         index = pattern.index[evidence.in_sight(pattern, theta)].double()
         if len(index) < FEWEST_SEEN:

@@ -20,9 +20,9 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
 from p3i.search.look.session import Session
 
-FOCALS_MM = (20.0, 80.0)
+FOCALS_MM = (20.0, 300.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
-FOCAL_SPREAD = 0.35
+FOCAL_SPREAD = 0.7
 """Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise."""
 # One step moves lengths by at most this share of a patch.
 _MOST_SHIFT = 0.4

@@ -35,6 +35,7 @@ from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import find_about, find_objects, frames, half_steps, spacing, whitening
 from p3i.search.look.straight import Straightened, shifted
 from p3i.search.look.thinned import thinned
+from p3i.search.look.upright import as_it_stands
 from p3i.size import Size
 
 Free = Literal["focal", "lens", "bend"]
@@ -198,6 +199,8 @@ def objects_of(
     focal_mm = focal_mm or evidence.focal_mm
     pattern, theta, canvas = filling.pattern, filling.theta(numbers), evidence.image.size
     index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
+    if pattern.turning is not None:
+        pattern, _ = as_it_stands(evidence, pattern, index, focal_mm=focal_mm, theta=theta)
     shown, index = len(index), index[thinned(index, _MOST_FOUND)]
     if shown < _FEWEST:
         return None

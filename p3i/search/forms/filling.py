@@ -216,6 +216,11 @@ def pinned(filling: Filling, z: Tensor, which: Tensor) -> Filling:
     )
 
 
+def standing(filling: Filling, *, upright: bool) -> Filling:
+    """The same filling, its objects taken to stand `upright`, or to turn with the curve."""
+    return replace(filling, pattern=replace(filling.pattern, upright=upright))
+
+
 def over(filling: Filling, index: list[tuple[int, int]]) -> Filling:
     """The same numbers and settings over these indices, whatever the settings draw of them."""
     masks = torch.ones(len(filling.settings), len(index), dtype=torch.bool)

@@ -20,6 +20,7 @@ from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.forms.length import CAMERA_BITS, cost_bits
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import recurrence_bits
+from p3i.search.look.upright import as_it_stands
 from p3i.search.result import NEEDED_BITS
 
 
@@ -36,6 +37,8 @@ def explained_bits(evidence: Evidence, answer: Answer) -> float:
     cost = cost_bits(answer.program)
     if len(index) < 2:
         return -cost
+    if pattern.turning is not None:
+        return as_it_stands(evidence, pattern, index, focal_mm=focal_mm)[1] - cost
     return recurrence_bits(evidence, pattern, index, focal_mm=focal_mm, cells=cells) - cost
 
 

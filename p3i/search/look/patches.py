@@ -2,8 +2,8 @@
 
 Cells (cells.py) are swept by fractional loop indices, which suits lattices. Rings, spirals and single rows
 have no second direction to sweep, and their objects turn as they go round. A patch is a square of plane of
-one size for the whole program, about each draw, turned with the curve where the program draws on a curve. As
-there, a pattern is where objects predict each other and do not predict what lies half a step away.
+one size for the whole program, about each draw, turned with the curve where the program draws on a curve and
+the objects do not stand upright (look/upright.py). As there, a pattern is where objects predict each other and do not predict what lies half a step away.
 
 Convention: N patches of `side` x `side` samples, C channels; `index` float64 [N, 2] loop indices, fractions
 allowed; plane coordinates in program units. Patch offsets (a, b) are in patch sides: a along the curve, b
@@ -79,7 +79,7 @@ def frames(pattern: Pattern, theta: Tensor, index: Tensor, *, side: float) -> Fr
     """The patches of `side` program units about `index` [N, 2]."""
     origin = pattern.points_at(index, theta)
     variable = pattern.turning
-    if variable is None:
+    if variable is None or pattern.upright:
         along = torch.tensor([side, 0.0], dtype=torch.float64).expand_as(origin)
     else:
         tangent = tangents(pattern, theta, index, variable)

@@ -38,6 +38,8 @@ ALONG = 16
 """Samples along a sector; waves up to half as many can be told."""
 ACROSS = 14
 """Samples across a sector."""
+UPRIGHT_BITS = 5.0
+"""What it costs to say that objects on a curve do not turn with it: of some thirty kinds of ring one hangs."""
 # More draws than this are judged by a part of them.
 _MOST_READ = 200
 # A sector of which less is known is none, and fewer than this many say nothing.
@@ -74,7 +76,8 @@ def recurrence_bits(
 
     `cells`: the draws are rows of rows, all of which are alike, and must come again along i and along j: the
     fewer bits count. Else each value of the loop variable that does not go along the curve has a ring, or
-    row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's.
+    row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's. That objects
+    on a curve stand upright has to be told: it costs UPRIGHT_BITS.
     """
     theta = pattern.theta if theta is None else theta
     every, index = len(index), index[thinned(index, _MOST_READ)]
@@ -89,7 +92,8 @@ def recurrence_bits(
     ring = index[:, 1 - along]
     rings = [read(index[ring == one], along) for one in ring.unique()]
     plainest = max((one.energy for one in rings), default=0.0)
-    return each * sum(_bits(one.waves) for one in rings if one.energy >= _FAINT * plainest)
+    saved = each * sum(_bits(one.waves) for one in rings if one.energy >= _FAINT * plainest)
+    return max(saved - UPRIGHT_BITS * pattern.upright, 0.0)
 
 
 def _bits(waves: NDArray[np.complex64]) -> float:
@@ -183,6 +187,9 @@ def _points(
     length = tangent.norm(dim=-1, keepdim=True).clamp(min=1e-12)
     across = quarter_turned(tangent) / length
     width = length.median(2, keepdim=True).values  # a step of this draw
+    if pattern.upright:
+        b_axis, a_axis = torch.meshgrid(up, forth, indexing="ij")
+        return pattern.points_at(index, theta)[:, None, None] + width * torch.stack([a_axis, b_axis], -1)
     middle = pattern.points_at(flat, theta).reshape(*where.shape)
     return middle + up[:, None, None] * width * across
 

@@ -49,6 +49,8 @@ _POSES_A_CENTRE = 3
 _MOST_CLIMBED = 5
 # A circle of spots is worth as much as a centre with so many votes.
 _SPOTS_WORTH = 0.15
+TELE_MM = 100.0
+"""Where nobody stated a focal, rings are looked for under a long one too."""
 # The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
 _STEP_DEG = 6.0
 _STEP_SHARE = 0.08
@@ -62,11 +64,12 @@ _LEAST_SHARE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Vote:
-    """A centre that rotations speak for: photo pixels, and the pose under which they do."""
+    """A centre that rotations speak for: photo pixels, and the pose and focal under which they do."""
 
     worth: float
     rx_deg: float
     ry_deg: float
+    focal_mm: float
     center_px: Array
 
 
@@ -89,7 +92,8 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
             at = photo_from_view @ [columns[place], rows[place], 1.0]
             center = at[:2] / at[2]
             if (np.abs(center - part.middle) < 0.53 * np.array([part.size.width, part.size.height])).all():
-                found.append(Vote(float(votes[rows[place], columns[place]]), rx_deg, ry_deg, center))
+                worth = float(votes[rows[place], columns[place]])
+                found.append(Vote(worth, rx_deg, ry_deg, evidence.focal_mm, center))
     return sorted(found, key=lambda vote: -vote.worth)
 
 
@@ -98,11 +102,13 @@ def ring_guesses(look: Session) -> list[Guess]:
     look.tell("turning", 0.82)
     evidence = look.evidence
     centres: list[tuple[Vote, list[Rows]]] = []
-    for votes in _by_centre(rotation_votes(evidence), evidence.part.size.longer):
-        centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
-    for camera, center_px in circles(evidence, np.random.default_rng(look.config.seed)):
-        vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, center_px)
-        centres.append((vote, _rows_about(evidence, vote)))
+    for focal_mm in (evidence.focal_mm, TELE_MM) if look.focal_is_free else (evidence.focal_mm,):
+        seen = evidence.under(focal_mm)
+        for votes in _by_centre(rotation_votes(seen), evidence.part.size.longer):
+            centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
+        for camera, center_px in circles(seen, np.random.default_rng(look.config.seed)):
+            vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, focal_mm, center_px)
+            centres.append((vote, _rows_about(evidence, vote)))
     centres.sort(key=_promise, reverse=True)
     found: list[Guess] = []
     for vote, rows in centres[:_MOST_CLIMBED]:
@@ -125,7 +131,7 @@ def _guess(evidence: Evidence, vote: Vote, row: Rows) -> Guess:
         "draw.y.offset.1": y,
     }
     promise = row.worth * math.sqrt(vote.worth)
-    return Guess(filling, numbers_of(filling, values), promise, focal_mm=evidence.focal_mm)
+    return Guess(filling, numbers_of(filling, values), promise, focal_mm=vote.focal_mm)
 
 
 def _distinct(guesses: list[Guess]) -> list[Guess]:
@@ -168,12 +174,12 @@ def _climbed(evidence: Evidence, vote: Vote, row: Rows) -> Vote:
     steps = np.array([_STEP_DEG, _STEP_DEG, _STEP_SHARE * radius_px, _STEP_SHARE * radius_px])
 
     def at(numbers: Array) -> Vote:
-        return Vote(vote.worth, float(numbers[0]), float(numbers[1]), numbers[2:])
+        return replace(vote, rx_deg=float(numbers[0]), ry_deg=float(numbers[1]), center_px=numbers[2:])
 
     def worth(numbers: Array) -> float:
         moved = at(numbers)
         pose, center = (moved.rx_deg, moved.ry_deg), _on_plane(evidence, moved)
-        strip = unroll(evidence, pose, center, focal_mm=evidence.focal_mm, about=row.radius)
+        strip = unroll(evidence, pose, center, focal_mm=vote.focal_mm, about=row.radius)
         return 0.0 if strip is None else likeness(strip, row.count)
 
     best = worth(numbers)
@@ -193,14 +199,14 @@ def _climbed(evidence: Evidence, vote: Vote, row: Rows) -> Vote:
 
 def _rows_about(evidence: Evidence, vote: Vote) -> list[Rows]:
     center = _on_plane(evidence, vote)
-    strip = unroll(evidence, (vote.rx_deg, vote.ry_deg), center, focal_mm=evidence.focal_mm)
+    strip = unroll(evidence, (vote.rx_deg, vote.ry_deg), center, focal_mm=vote.focal_mm)
     return [] if strip is None else best_rows(strip)
 
 
 def _on_plane(evidence: Evidence, vote: Vote) -> Array:
     """The vote's centre in program units under its pose."""
     matrix = image_from_plane(
-        vote.rx_deg, vote.ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm
+        vote.rx_deg, vote.ry_deg, size=evidence.image.size, focal_mm=vote.focal_mm
     ).numpy()
     at = np.linalg.inv(matrix) @ [*vote.center_px, 1.0]
     return at[:2] / at[2]
