@@ -327,6 +327,8 @@ def _with_headers(result: SynthesisResult, *, size: "Size", name: str | None) ->
         if margin is not None:
             facts["margin"] = round(margin, 4)
         facts |= {"features": result.features, "focal_from": answer.focal_source, "seed": result.seed}
+        if answer.upright:
+            facts["upright"] = True
         if result.window is not None:
             facts["window"] = ",".join(map(str, result.window))
         header = Header(

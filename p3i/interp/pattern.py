@@ -32,8 +32,8 @@ class Pattern:
     `paths` [P] names each number of theta (`camera.rx`, `camera.ry`, `draw.x.i`, ...: see grammar/leaves.py);
     `theta` [P] float64 holds the program's own values; `index` [N, 2] int64 the live (i, j) in the order of
     the loops; `edges` [E, 2] int64 the neighbours of equation 2, as positions in `index`. `upright`: what is
-    drawn on a curve keeps its direction, as the gondolas of a wheel do, and does not turn with the curve; that
-    is nothing that a program says, but how a photo is read by it.
+    drawn on a curve keeps its direction, as the gondolas of a wheel do, and does not turn with the curve;
+    that is nothing that a program says, but how a photo is read by it.
     """
 
     program: Program

@@ -29,11 +29,13 @@ class Chart:
     """The plane in coordinates of the program.
 
     A place has four coordinates: i, j, and the steps s and t sideways, for programs that run in less than
-    two directions. `axes` are the two of them that span a cell.
+    two directions. `axes` are the two of them that span a cell. `upright`: cells about the objects of one
+    ring do not turn with it, and do not meet.
     """
 
     pattern: Pattern
     axes: tuple[int, int]
+    upright: bool = False
 
     def at(self, place: np.ndarray) -> np.ndarray:
         """The points [K, 2] at `place` [K, 4]."""
@@ -43,6 +45,12 @@ class Chart:
                 return middle
             case (2, 3):
                 return middle + DEFAULT_PITCH * sideways
+            case (variable, _) if self.upright:
+                nearest = place[:, :2].copy()
+                nearest[:, variable] = np.round(nearest[:, variable])
+                length = np.linalg.norm(_step(self.pattern, nearest, variable), axis=1)[:, None]
+                beside = np.stack([place[:, variable] - nearest[:, variable], sideways[:, 1]], axis=1)
+                return _points(self.pattern, nearest) + length * beside
             case (variable, _):
                 along = _step(self.pattern, place[:, :2], variable)
                 return middle + sideways[:, 1:] * np.stack([-along[:, 1], along[:, 0]], axis=1)

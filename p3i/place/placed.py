@@ -5,7 +5,7 @@ centres at whole numbers; matrices map program units to pixels, their third row 
 front). On a photo whose lens bends lines (header key lens_k1) they lead to pinhole pixels: see flat.py.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -102,6 +102,8 @@ def camera_of(
 def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> Placed:
     """`program` on the canvas of `photo`; the focal is `focal_mm`, else the header's, the photo's, 35 mm.
 
+    That objects stand upright on their ring is for the header to say, as `synth` writes it: `upright = true`.
+
     Raises ProgramError for a program without objects, with none in front of the camera, whose plane is seen
     edge-on, or whose loops step farther than any picture reaches.
     """
@@ -110,7 +112,8 @@ def placed(program: Program, photo: Image, *, focal_mm: float | None = None) -> 
     drawn = points(program)
     found = [place for place in drawn if abs(place[0]) < FAR and abs(place[1]) < FAR]
     kept = [found[place] for place in distinct(found)]
-    pattern = compile(program)
+    facts = dict(program.header.fit) if program.header else {}
+    pattern = replace(compile(program), upright=facts.get("upright") is True)
     result = Placed(
         pattern,
         camera,

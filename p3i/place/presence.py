@@ -8,6 +8,8 @@ where its place is empty or covered by something else.
 Convention: pixels of the photo, pixel centres at whole numbers; `index` [K, 2] holds (i, j).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,7 +56,7 @@ def presence_of(laid: Placed, photo: Image, index: np.ndarray) -> Array:
     `photo` is flat, as `laid` is (flat.py).
     """
     unknown = np.full(len(index), np.nan)
-    chart = chart_of(laid.pattern)
+    chart = replace(chart_of(laid.pattern), upright=laid.pattern.upright)
     if len(index) < _FEWEST or not chart.directions:
         return unknown
     sheet = sheet_of(laid, photo, chart, index)

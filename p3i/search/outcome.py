@@ -11,6 +11,7 @@ from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
 from p3i.search.judge.table1 import unwritable_note, within_table1
 from p3i.search.look.session import Session
+from p3i.search.look.upright import UPRIGHT_NOTE
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
 from p3i.search.optics.printed import as_precise_as_fitted
@@ -61,7 +62,8 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     other = _mirrored(look, first)
     doubt = None if sigma_deg is None else doubt_note(sigma_deg, two_tilts=other is not None)
     ambiguity = None if other is None else ambiguity_note(other)
-    notes = (*first.notes, *(note for note in (ambiguity, doubt) if note is not None))
+    hanging = UPRIGHT_NOTE if first.upright else None
+    notes = (*first.notes, *(note for note in (hanging, ambiguity, doubt) if note is not None))
     if config.extent_used == "image" and first.structure != "lattice":
         notes = (*notes, "--extent image continues lattices only: this is drawn as far as it was found")
     notes = (*notes, *reading_notes(first, config))
@@ -96,6 +98,7 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
                 false_alarms=None if asked else false_alarms(answer.worth),
                 reading=next((one for one in answer.readings if one.drawn), None),
                 same_lattice=answer in elsewhere,
+                upright=answer.upright,
                 **_focal_facts(answer, assumed),  # pyright: ignore[reportArgumentType]
             )
             for answer, told_by in zip(listed, signs, strict=True)
@@ -108,6 +111,7 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         mirrored=None if other is None else (round(other.rx_deg, 2), round(other.ry_deg, 2)),
         others=first.others,
         window=look.evidence.part.window,
+        upright=first.upright,
         notes=notes,
         **_focal_facts(first, assumed),
     )

@@ -105,6 +105,7 @@ class Candidate:
     false_alarms: float | None = None
     reading: Reading | None = None
     same_lattice: bool = False
+    upright: bool = False
 
     @property
     def title(self) -> str:
@@ -184,6 +185,7 @@ class SynthesisResult:
     there are, which `p3i.synth_all` looks for.
     `window` is the rectangle (x, y, width, height) of photo pixels that was looked at closer: the box of a
     region of interest, or the part that the search chose; None for all of it.
+    `upright`: the objects of a ring keep their direction, as a wheel's gondolas do, and do not turn with it.
     `least_period_px` of a photo that was refused: what repeats more closely than so many pixels was too small
     to be seen, since the photo is looked at reduced; None where nothing was.
     `notes` are sentences for the user about the answer, such as the distance of a strict fit to the free.
@@ -214,6 +216,7 @@ class SynthesisResult:
     mirrored: tuple[float, float] | None = None
     others: tuple[Other, ...] = ()
     window: tuple[int, int, int, int] | None = None
+    upright: bool = False
     least_period_px: int | None = None
     notes: tuple[str, ...] = ()
 
@@ -286,6 +289,8 @@ class SynthesisResult:
             "features": self.features,
             "seed": self.seed,
         }
+        if self.upright:
+            record["upright"] = True
         if self.window is not None:
             record["window"] = list(self.window)
         if self.others:

@@ -72,9 +72,7 @@ def _ring(look: Session, start: Fit) -> Fit:
 
 
 def _stands_upright(look: Session, fit: Fit) -> bool:
-    pattern, _ = as_it_stands(
-        look.evidence, fit.pattern, fit.index, focal_mm=fit.focal_mm, theta=fit.theta
-    )
+    pattern, _ = as_it_stands(look.evidence, fit.pattern, fit.index, focal_mm=fit.focal_mm, theta=fit.theta)
     return pattern.upright
 
 

@@ -3,7 +3,8 @@
 Cells (cells.py) are swept by fractional loop indices, which suits lattices. Rings, spirals and single rows
 have no second direction to sweep, and their objects turn as they go round. A patch is a square of plane of
 one size for the whole program, about each draw, turned with the curve where the program draws on a curve and
-the objects do not stand upright (look/upright.py). As there, a pattern is where objects predict each other and do not predict what lies half a step away.
+the objects do not stand upright (upright.py). As there, a pattern is where objects predict each other and do
+not predict what lies half a step away.
 
 Convention: N patches of `side` x `side` samples, C channels; `index` float64 [N, 2] loop indices, fractions
 allowed; plane coordinates in program units. Patch offsets (a, b) are in patch sides: a along the curve, b

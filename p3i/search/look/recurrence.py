@@ -39,7 +39,7 @@ ALONG = 16
 ACROSS = 14
 """Samples across a sector."""
 UPRIGHT_BITS = 5.0
-"""What it costs to say that objects on a curve do not turn with it: of some thirty kinds of ring one hangs."""
+"""What it costs to say that objects on a curve do not turn with it: one kind of ring in thirty does so."""
 # More draws than this are judged by a part of them.
 _MOST_READ = 200
 # A sector of which less is known is none, and fewer than this many say nothing.
@@ -76,8 +76,8 @@ def recurrence_bits(
 
     `cells`: the draws are rows of rows, all of which are alike, and must come again along i and along j: the
     fewer bits count. Else each value of the loop variable that does not go along the curve has a ring, or
-    row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's. That objects
-    on a curve stand upright has to be told: it costs UPRIGHT_BITS.
+    row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's. That
+    objects on a curve stand upright has to be told: it costs UPRIGHT_BITS.
     """
     theta = pattern.theta if theta is None else theta
     every, index = len(index), index[thinned(index, _MOST_READ)]

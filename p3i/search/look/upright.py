@@ -1,4 +1,4 @@
-"""How objects on a curve stand: turned with it, as the hours of a dial, or upright, as the gondolas of a wheel."""
+"""How objects on a curve stand: turned with it, as hours of a dial, or upright, as gondolas of a wheel."""
 
 from dataclasses import replace
 
@@ -7,6 +7,8 @@ from torch import Tensor
 from p3i.interp.pattern import Pattern
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import recurrence_bits
+
+UPRIGHT_NOTE = "the objects stand upright: they do not turn with the ring, as the gondolas of a wheel do not"
 
 
 def as_it_stands(
