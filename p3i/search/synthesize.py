@@ -107,11 +107,13 @@ def searched(look: Session) -> Best:
 def _take_up(look: Session, sketch: Sketched, proposer: Proposer, best: Best) -> None:
     """Fill a sketch: fit the guesses of each round, draw the best of the fits, and judge what is drawn."""
     look.record("sketch", name=sketch.name, bits=sketch.bits)
+    drawn: list[Fit] = []
     with look.until_interrupted(), look.within(share_of_time(look.config, sketch)):
         for guesses in proposer.rounds(look, sketch, best):
             fits = _fitted(look, guesses, most=proposer.most_fitted)
             best.fits += [fit for _, fit in fits]
-            for guess, fit in _rivals(look, fits, sketch, best, most=proposer.most_drawn):
+            for guess, fit in _rivals(look, fits, sketch, best, drawn, most=proposer.most_drawn):
+                drawn.append(fit)
                 look.tell("reading off the objects", 0.8)
                 found = look.completed(partial(_drawn, look, sketch, guess, fit))
                 if found is not None:
@@ -161,21 +163,22 @@ def _fit(look: Session, guess: Guess) -> Fit | None:
 
 
 def _rivals(
-    look: Session, fits: list[Fitted], sketch: Sketched, best: Best, *, most: int
+    look: Session, fits: list[Fitted], sketch: Sketched, best: Best, drawn: list[Fit], *, most: int
 ) -> Iterator[Fitted]:
-    """The fits to draw, the best first: once an answer is sure, only what could still be a better one."""
-    done: list[Fit] = []
-    top = look.config.top
+    """The fits to draw, the best first: once an answer is sure, only what could still be a better one.
+
+    `drawn` are those that were drawn so far, of this round and of those before.
+    """
+    top, before = look.config.top, len(drawn)
     for guess, fit in fits:
-        if len(done) >= max(most, top) or (done and not look.go_on()):
+        if len(drawn) - before >= max(most, top) or (len(drawn) > before and not look.go_on()):
             return
         answers = best.of(sketch)
         if sketch.by_hand is None and any(beyond_noise(answer.worth) for answer in answers):
-            if len(answers) >= top and worth(fit) < _RIVAL * worth(done[0]):
+            if len(answers) >= top and worth(fit) < _RIVAL * max(map(worth, drawn)):
                 return
-            if any(same_lattice(look.evidence, fit, other) for other in done):
+            if any(same_lattice(look.evidence, fit, other) for other in drawn):
                 continue
-        done.append(fit)
         yield guess, fit
 
 

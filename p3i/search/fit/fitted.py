@@ -24,8 +24,9 @@ class Fit:
 
     `index` [N, 2] are the objects in sight, `contrast` [N] how well each is predicted by the others beyond
     half a step. Of curves, `side` is the patches' side in program units and `cost` the robust misfit of the
-    objects' places, and `bits` what a ring's save (fit/saved.py); of lattices, `covered` is the sum of what
-    is predicted beyond SUPPORT, by the cells' shares of the picture.
+    objects' places; of a ring, `bits` is what its objects save (fit/saved.py) and `covered` the share of the
+    picture that they fill; of lattices, `covered` is the sum of what is predicted beyond SUPPORT, by the
+    cells' shares of the picture.
     """
 
     filling: Filling

@@ -1,5 +1,6 @@
 """One fit for every guess: over the cells of a lattice, over patches about the draws of anything else."""
 
+import math
 from dataclasses import replace
 
 import torch
@@ -15,7 +16,8 @@ from p3i.search.fit.within import followed_within
 from p3i.search.forms.filling import standing, with_settings
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import lattice_filling
-from p3i.search.look.patches import spacing
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.patches import areas_px, frames, spacing
 from p3i.search.look.session import Session
 from p3i.search.look.upright import as_it_stands
 
@@ -67,8 +69,16 @@ def _ring(look: Session, start: Fit) -> Fit:
         upright = measured(look.evidence, filling, start.z, focal_mm=start.focal_mm)
         starts += [] if upright is None else [upright]
     rings = [as_far_as_it_goes(look, settled(look, one, rounds=_ROUNDS)) for one in starts]
-    told = [replace(ring, bits=saved_bits(look.evidence, ring)) for ring in rings]
-    return max(told, key=worth)
+    return max((_told(look.evidence, ring) for ring in rings), key=worth)
+
+
+def _told(evidence: Evidence, ring: Fit) -> Fit:
+    """A ring with what its objects save, and the share of the photo that they fill."""
+    size = evidence.image.size
+    matrix = ring.pattern.image_from_plane(ring.theta, size=size, focal_mm=ring.focal_mm)
+    areas = areas_px(matrix, frames(ring.pattern, ring.theta, ring.index, side=ring.side))
+    covered = float(areas.sum()) / (size.width * size.height)
+    return replace(ring, covered=covered, bits=saved_bits(evidence, ring))
 
 
 def _stands_upright(look: Session, fit: Fit) -> bool:
@@ -92,7 +102,8 @@ def worth(fit: Fit) -> float:
         return fit.covered
     if fit.filling is not lattice_filling():
         rings = len(fit.index[:, 0].unique())
-        return fit.bits if rings == 1 else fit.mean * len(fit.contrast)
+        # Of rings that save alike, the one that is seen larger is meant.
+        return fit.bits * math.sqrt(fit.covered) if rings == 1 else fit.mean * len(fit.contrast)
     contrast = fit.contrast[fit.support]
     count = len(contrast)
     if count < FEWEST_OBJECTS:

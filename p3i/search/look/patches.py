@@ -237,15 +237,25 @@ def find_about(
 
 def whitening(matrix: Tensor, where: Frames) -> Tensor:
     """[N, 2, 2]: differences in pixels to differences in units of places' noise, along and across."""
+    px_from_side = _px_from_side(matrix, where)
+    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
+    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
+    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
+
+
+def areas_px(matrix: Tensor, where: Frames) -> Tensor:
+    """The area of each patch on the photo, in square pixels: [N]; `matrix` [3, 3] takes units to pixels."""
+    return torch.linalg.det(_px_from_side(matrix, where)).abs()
+
+
+def _px_from_side(matrix: Tensor, where: Frames) -> Tensor:
+    """[N, 2, 2]: steps in patch sides, along and across, to steps in pixels."""
     columns = []
     for axis in (where.along, where.across):
         ahead, _ = project(matrix, where.origin + 0.1 * axis)
         behind, _ = project(matrix, where.origin - 0.1 * axis)
         columns.append((ahead - behind) / 0.2)
-    px_from_side = torch.stack(columns, 2)
-    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
-    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
-    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
+    return torch.stack(columns, 2)
 
 
 def misfit(difference: Tensor, *, whiten: Tensor, certainty: Tensor) -> float:

@@ -16,7 +16,7 @@ from p3i.search.propose.holes import hole_guesses
 from p3i.search.propose.lattices import lattice_guesses
 from p3i.search.propose.paper import paper_guesses
 from p3i.search.propose.repeats import guesses_around
-from p3i.search.propose.votes import ring_guesses
+from p3i.search.propose.votes import ring_rounds
 
 Rounds = Iterator[Iterable[Guess]]
 
@@ -37,7 +37,7 @@ class Proposer:
 
 
 LATTICES = Proposer(frozenset({"lattice"}), lambda look, _, __: iter([lattice_guesses(look)]), 7, 3)
-RINGS = Proposer(frozenset({"ring", "arc"}), lambda look, _, __: iter([ring_guesses(look)]), 8, 2)
+RINGS = Proposer(frozenset({"ring", "arc"}), lambda look, _, __: ring_rounds(look), 8, 2)
 AROUND = Proposer(
     frozenset({"rings in rings", "fan", "rings in a row"}),
     lambda look, _, best: iter([guesses_around(look, best.rings())]),

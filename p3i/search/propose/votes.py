@@ -8,6 +8,7 @@ photo is unrolled, angle against the logarithm of the radius (look/unrolled.py),
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cv2
@@ -50,7 +51,8 @@ _MOST_CLIMBED = 5
 # A circle of spots is worth as much as a centre with so many votes.
 _SPOTS_WORTH = 0.15
 TELE_MM = 100.0
-"""Where nobody stated a focal, rings are looked for under a long one too."""
+"""The long focal under which rings are looked for too: from three times the usual one on, tilted circles far
+from the middle are no circles under that one."""
 # The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
 _STEP_DEG = 6.0
 _STEP_SHARE = 0.08
@@ -64,12 +66,11 @@ _LEAST_SHARE = 0.03
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Vote:
-    """A centre that rotations speak for: photo pixels, and the pose and focal under which they do."""
+    """A centre that rotations speak for: photo pixels, and the pose under which they do."""
 
     worth: float
     rx_deg: float
     ry_deg: float
-    focal_mm: float
     center_px: Array
 
 
@@ -93,22 +94,26 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
             center = at[:2] / at[2]
             if (np.abs(center - part.middle) < 0.53 * np.array([part.size.width, part.size.height])).all():
                 worth = float(votes[rows[place], columns[place]])
-                found.append(Vote(worth, rx_deg, ry_deg, evidence.focal_mm, center))
+                found.append(Vote(worth, rx_deg, ry_deg, center))
     return sorted(found, key=lambda vote: -vote.worth)
 
 
-def ring_guesses(look: Session) -> list[Guess]:
+def ring_rounds(look: Session) -> Iterator[list[Guess]]:
+    """Rings as the focal that is assumed shows them, then, where nobody stated it, as a long one does."""
+    yield _ring_guesses(look, look.evidence)
+    if look.focal_is_free:
+        yield _ring_guesses(look, look.evidence.under(TELE_MM))
+
+
+def _ring_guesses(look: Session, evidence: Evidence) -> list[Guess]:
     """Rings about the centres with the most votes and on circles of spots, the most promising first."""
     look.tell("turning", 0.82)
-    evidence = look.evidence
     centres: list[tuple[Vote, list[Rows]]] = []
-    for focal_mm in (evidence.focal_mm, TELE_MM) if look.focal_is_free else (evidence.focal_mm,):
-        seen = evidence.under(focal_mm)
-        for votes in _by_centre(rotation_votes(seen), evidence.part.size.longer):
-            centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
-        for camera, center_px in circles(seen, np.random.default_rng(look.config.seed)):
-            vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, focal_mm, center_px)
-            centres.append((vote, _rows_about(evidence, vote)))
+    for votes in _by_centre(rotation_votes(evidence), evidence.part.size.longer):
+        centres.append(max(((vote, _rows_about(evidence, vote)) for vote in votes), key=_promise))
+    for camera, center_px in circles(evidence, np.random.default_rng(look.config.seed)):
+        vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, center_px)
+        centres.append((vote, _rows_about(evidence, vote)))
     centres.sort(key=_promise, reverse=True)
     found: list[Guess] = []
     for vote, rows in centres[:_MOST_CLIMBED]:
@@ -131,7 +136,7 @@ def _guess(evidence: Evidence, vote: Vote, row: Rows) -> Guess:
         "draw.y.offset.1": y,
     }
     promise = row.worth * math.sqrt(vote.worth)
-    return Guess(filling, numbers_of(filling, values), promise, focal_mm=vote.focal_mm)
+    return Guess(filling, numbers_of(filling, values), promise, focal_mm=evidence.focal_mm)
 
 
 def _distinct(guesses: list[Guess]) -> list[Guess]:
@@ -179,7 +184,7 @@ def _climbed(evidence: Evidence, vote: Vote, row: Rows) -> Vote:
     def worth(numbers: Array) -> float:
         moved = at(numbers)
         pose, center = (moved.rx_deg, moved.ry_deg), _on_plane(evidence, moved)
-        strip = unroll(evidence, pose, center, focal_mm=vote.focal_mm, about=row.radius)
+        strip = unroll(evidence, pose, center, focal_mm=evidence.focal_mm, about=row.radius)
         return 0.0 if strip is None else likeness(strip, row.count)
 
     best = worth(numbers)
@@ -199,14 +204,14 @@ def _climbed(evidence: Evidence, vote: Vote, row: Rows) -> Vote:
 
 def _rows_about(evidence: Evidence, vote: Vote) -> list[Rows]:
     center = _on_plane(evidence, vote)
-    strip = unroll(evidence, (vote.rx_deg, vote.ry_deg), center, focal_mm=vote.focal_mm)
+    strip = unroll(evidence, (vote.rx_deg, vote.ry_deg), center, focal_mm=evidence.focal_mm)
     return [] if strip is None else best_rows(strip)
 
 
 def _on_plane(evidence: Evidence, vote: Vote) -> Array:
     """The vote's centre in program units under its pose."""
     matrix = image_from_plane(
-        vote.rx_deg, vote.ry_deg, size=evidence.image.size, focal_mm=vote.focal_mm
+        vote.rx_deg, vote.ry_deg, size=evidence.image.size, focal_mm=evidence.focal_mm
     ).numpy()
     at = np.linalg.inv(matrix) @ [*vote.center_px, 1.0]
     return at[:2] / at[2]
