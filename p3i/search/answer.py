@@ -15,8 +15,8 @@ class Answer:
     where it is the one assumed; then `focal_reason` may say why no other was found. `lens_k1` is the radial
     distortion of the photo that the program holds on (p3i/interp/lens.py), None for a pinhole camera.
     `readings` are the places of a lattice's cell that may be its object, the likeliest first.
-    `others` are the patterns beside this one that were met on the way to it. `upright`: the objects of a ring
-    do not turn with it (look/upright.py).
+    `others` are the patterns beside this one that were met on the way to it. `covered` is the share of the
+    picture that a ring's objects fill. `upright`: these do not turn with it (look/upright.py).
     """
 
     program: Program
@@ -29,4 +29,5 @@ class Answer:
     lens_k1: float | None = None
     readings: tuple[Reading, ...] = ()
     others: tuple[Other, ...] = ()
+    covered: float = 1.0
     upright: bool = False

@@ -185,7 +185,7 @@ def _rivals(
 def _answers(look: Session) -> list[Answer]:
     """The answers of a search, those first that explain most."""
     best = searched(look)
-    answers = sorted(best.asked(), key=lambda answer: -answer.worth)
+    answers = best.in_order()
     if asks_for_itself(look.config):
         return answers
     lattices = [fit for fit in best.fits if fit.filling is lattice_filling()]

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from p3i.search.answer import Answer
-from p3i.search.fit.fitted import Drawn, Fit
+from p3i.search.fit.fitted import Drawn, Fit, as_large_as_seen
 from p3i.search.forms.sketches import Sketched
 from p3i.search.result import NEEDED_BITS
 
@@ -60,6 +60,17 @@ class Best:
         others = (one for one in self.found if one.sketch is not sketch)
         alike = [one for one in others if one.sketch.structure == sketch.structure]
         return sorted((answer for one in alike for answer in one.answers), key=lambda one: -one.worth)
+
+    def in_order(self) -> list[Answer]:
+        """The answers, those first whose structure explains most, and of its rings the one that is meant."""
+        answers, most = list(self.asked()), dict[str, float]()
+        for answer in answers:
+            most[answer.structure] = max(answer.worth, most.get(answer.structure, answer.worth))
+
+        def order(answer: Answer) -> tuple[float, float]:
+            return -most[answer.structure], -as_large_as_seen(answer.worth, answer.covered)
+
+        return sorted(answers, key=order)
 
     def asked(self) -> Iterator[Answer]:
         """The answers that the options ask for, not those that others only start from."""

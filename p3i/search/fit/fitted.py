@@ -24,9 +24,9 @@ class Fit:
 
     `index` [N, 2] are the objects in sight, `contrast` [N] how well each is predicted by the others beyond
     half a step. Of curves, `side` is the patches' side in program units and `cost` the robust misfit of the
-    objects' places; of a ring, `bits` is what its objects save (fit/saved.py) and `covered` the share of the
-    picture that they fill; of lattices, `covered` is the sum of what is predicted beyond SUPPORT, by the
-    cells' shares of the picture.
+    objects' places, `covered` the share of the picture that they fill, and `bits` what a ring's save
+    (fit/saved.py); of lattices, `covered` is the sum of what is predicted beyond SUPPORT, by the cells'
+    shares of the picture.
     """
 
     filling: Filling
@@ -67,6 +67,15 @@ class Fit:
     def program(self) -> Program:
         """The program as fitted, its bounds and guards as the sketch writes them."""
         return self.filling.program(self.z, self.filling.settings[0])
+
+
+def as_large_as_seen(bits: float, covered: float) -> float:
+    """What a ring is worth beside others that save `bits` too, where it fills this share of the picture.
+
+    Natural pictures look alike at every scale, so that small rings, of teeth and ticks, save as much as large
+    ones. Of rings that save alike, the one that is seen larger is meant.
+    """
+    return bits * covered ** (1 / 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,13 +1,12 @@
 """One fit for every guess: over the cells of a lattice, over patches about the draws of anything else."""
 
-import math
 from dataclasses import replace
 
 import torch
 
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.arc import as_far_as_it_goes
-from p3i.search.fit.fitted import Fit
+from p3i.search.fit.fitted import Fit, as_large_as_seen
 from p3i.search.fit.grow import grow
 from p3i.search.fit.places import follow, measured, settled
 from p3i.search.fit.rings import says_more
@@ -16,8 +15,7 @@ from p3i.search.fit.within import followed_within
 from p3i.search.forms.filling import standing, with_settings
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import lattice_filling
-from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import areas_px, frames, spacing
+from p3i.search.look.patches import spacing
 from p3i.search.look.session import Session
 from p3i.search.look.upright import as_it_stands
 
@@ -69,16 +67,7 @@ def _ring(look: Session, start: Fit) -> Fit:
         upright = measured(look.evidence, filling, start.z, focal_mm=start.focal_mm)
         starts += [] if upright is None else [upright]
     rings = [as_far_as_it_goes(look, settled(look, one, rounds=_ROUNDS)) for one in starts]
-    return max((_told(look.evidence, ring) for ring in rings), key=worth)
-
-
-def _told(evidence: Evidence, ring: Fit) -> Fit:
-    """A ring with what its objects save, and the share of the photo that they fill."""
-    size = evidence.image.size
-    matrix = ring.pattern.image_from_plane(ring.theta, size=size, focal_mm=ring.focal_mm)
-    areas = areas_px(matrix, frames(ring.pattern, ring.theta, ring.index, side=ring.side))
-    covered = float(areas.sum()) / (size.width * size.height)
-    return replace(ring, covered=covered, bits=saved_bits(evidence, ring))
+    return max((replace(ring, bits=saved_bits(look.evidence, ring)) for ring in rings), key=worth)
 
 
 def _stands_upright(look: Session, fit: Fit) -> bool:
@@ -102,8 +91,7 @@ def worth(fit: Fit) -> float:
         return fit.covered
     if fit.filling is not lattice_filling():
         rings = len(fit.index[:, 0].unique())
-        # Of rings that save alike, the one that is seen larger is meant.
-        return fit.bits * math.sqrt(fit.covered) if rings == 1 else fit.mean * len(fit.contrast)
+        return as_large_as_seen(fit.bits, fit.covered) if rings == 1 else fit.mean * len(fit.contrast)
     contrast = fit.contrast[fit.support]
     count = len(contrast)
     if count < FEWEST_OBJECTS:

@@ -17,7 +17,7 @@ from p3i.search.fit.robust import robust_fit
 from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import score_of_curve
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import find_objects, frames, misfit, patch_contrast, spacing, whitening
+from p3i.search.look.patches import areas_px, find_objects, frames, misfit, patch_contrast, spacing, whitening
 from p3i.search.look.session import Session
 
 FOCALS_MM = (20.0, 300.0)
@@ -42,7 +42,12 @@ def measured(
     if len(index) < FEWEST_SEEN:
         return None
     found = patch_contrast(evidence, pattern, theta, index, side=side, focal_mm=focal_mm)
-    return Fit(filling, z, focal_mm, side, index, found)
+    size = evidence.image.size
+    matrix = pattern.image_from_plane(theta, size=size, focal_mm=focal_mm)
+    areas = areas_px(matrix, frames(pattern, theta, index, side=side))
+    return Fit(
+        filling, z, focal_mm, side, index, found, covered=float(areas.sum()) / (size.width * size.height)
+    )
 
 
 def registered(

@@ -38,6 +38,7 @@ def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
         focal_mm=None if stated else round(drawn.fit.focal_mm, 2),
         focal_reason="" if stated else "estimated from the pattern, its ring taken as a circle",
         readings=drawn.readings,
+        covered=drawn.fit.covered if sketch.structure == "circular" else 1.0,
         upright=drawn.fit.pattern.upright,
     )
     return answer if sketch.structure != "hybrid" else _without_empty_middle(look, answer)
