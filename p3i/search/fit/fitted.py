@@ -73,9 +73,10 @@ def as_large_as_seen(bits: float, covered: float) -> float:
     """What a ring is worth beside others that save `bits` too, where it fills this share of the picture.
 
     Natural pictures look alike at every scale, so that small rings, of teeth and ticks, save as much as large
-    ones. Of rings that save alike, the one that is seen larger is meant.
+    ones. Of rings that save alike, the one that is seen larger is meant. Powers of the share between 0.2 and
+    0.6 put the same rings first on 60 pictures.
     """
-    return bits * covered ** (1 / 3)
+    return bits * covered**0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
