@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Drawn, Fit, as_large_as_seen
+from p3i.search.fit.places import values_of
 from p3i.search.forms.sketches import Sketched
 from p3i.search.result import NEEDED_BITS
 
@@ -50,6 +51,15 @@ class Best:
         """The rings that were found, the surest first."""
         rings = [one.drawn for one in self.found if one.sketch.shape == "ring"]
         return sorted(rings, key=lambda drawn: -drawn.sure)
+
+    def holds_closed_ring(self) -> bool:
+        """Whether a ring beyond noise was found that goes all the way round, its step a part of a turn."""
+        return any(
+            one.sketch.shape == "ring"
+            and "draw.x.angle.j" not in values_of(one.drawn.fit)
+            and any(answer.worth > NEEDED_BITS for answer in one.answers)
+            for one in self.found
+        )
 
     def of(self, sketch: Sketched) -> list[Answer]:
         """The answers that a sketch has."""

@@ -37,7 +37,7 @@ class Proposer:
 
 
 LATTICES = Proposer(frozenset({"lattice"}), lambda look, _, __: iter([lattice_guesses(look)]), 7, 3)
-RINGS = Proposer(frozenset({"ring", "arc"}), lambda look, _, __: ring_rounds(look), 8, 2)
+RINGS = Proposer(frozenset({"ring", "arc"}), lambda look, _, best: ring_rounds(look, best), 8, 2)
 AROUND = Proposer(
     frozenset({"rings in rings", "fan", "rings in a row"}),
     lambda look, _, best: iter([guesses_around(look, best.rings())]),

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
+from p3i.search.fit.best import Best
 from p3i.search.fit.places import numbers_of
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import ring_filling
@@ -98,10 +99,13 @@ def rotation_votes(evidence: Evidence) -> list[Vote]:
     return sorted(found, key=lambda vote: -vote.worth)
 
 
-def ring_rounds(look: Session) -> Iterator[list[Guess]]:
-    """Rings as the focal that is assumed shows them, then, where nobody stated it, as a long one does."""
+def ring_rounds(look: Session, best: Best) -> Iterator[list[Guess]]:
+    """Rings as the focal that is assumed shows them, then, where nobody stated it, as a long one does.
+
+    A closed ring says itself that its camera is right: under another one its steps do not make a whole turn.
+    """
     yield _ring_guesses(look, look.evidence)
-    if look.focal_is_free:
+    if look.focal_is_free and not best.holds_closed_ring():
         yield _ring_guesses(look, look.evidence.under(TELE_MM))
 
 
