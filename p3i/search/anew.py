@@ -6,7 +6,7 @@ from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.extent.layout import found_layout, refitted
 from p3i.search.forms.lattice import Lattice
-from p3i.search.judge.bits import explained_bits
+from p3i.search.judge.bits import explained
 from p3i.search.look.evidence import Evidence
 
 
@@ -15,7 +15,7 @@ def drawn_anew(evidence: Evidence, answer: Answer) -> Answer:
     there if that says more.
     """
     drawn = compile(answer.program)
-    answer = replace(answer, worth=explained_bits(evidence, answer))
+    answer = explained(evidence, answer)
     found = None
     if answer.worth > 0:
         found = found_layout(evidence, Lattice.of(drawn, drawn.theta), drawn.index.double())
@@ -23,5 +23,5 @@ def drawn_anew(evidence: Evidence, answer: Answer) -> Answer:
         return answer
     layout = refitted(evidence, found[0])
     wider = replace(answer, program=layout.program(), readings=layout.readings)
-    wider = replace(wider, worth=explained_bits(evidence, wider))
+    wider = explained(evidence, wider)
     return max(answer, wider, key=lambda one: one.worth)

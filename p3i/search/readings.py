@@ -15,7 +15,7 @@ from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.extent.layout import filling_layout, layout_at, refitted
 from p3i.search.forms.lattice import Lattice
-from p3i.search.judge.bits import explained_bits
+from p3i.search.judge.bits import explained
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.look.session import Session
 from p3i.search.result import Reading
@@ -70,7 +70,7 @@ def _others(session: Session, answer: Answer) -> Iterator[Answer]:
             layout = filling_layout(evidence, layout)
         other = replace(answer, program=layout.program(), readings=layout.readings, notes=())
         score = score_of_program(evidence, other.program)
-        yield replace(other, score=score, worth=explained_bits(session.evidence, other))
+        yield replace(explained(session.evidence, other), score=score)
 
 
 def _seen_from(drawn: Reading, readings: tuple[Reading, ...]) -> tuple[Reading, ...]:

@@ -8,7 +8,7 @@ from p3i.search.answer import Answer
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.fitted import Drawn
 from p3i.search.forms.sketches import Sketched, structure_of
-from p3i.search.judge.bits import explained_bits
+from p3i.search.judge.bits import explained, explained_bits
 from p3i.search.judge.evaluate import score_of_program
 from p3i.search.judge.table1 import in_table1
 from p3i.search.look.session import Session
@@ -23,7 +23,7 @@ def answers_of(look: Session, sketch: Sketched, drawn: Drawn) -> list[Answer]:
         return [Answer(drawn.program, sketch.structure, score, drawn.fit.covered)]
     answer = _free(look, sketch, drawn)
     written = in_table1(look, drawn.fit, answer) if look.config.strict else [answer]
-    return [replace(one, worth=explained_bits(look.evidence, one)) for one in written]
+    return [explained(look.evidence, one) for one in written]
 
 
 def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
@@ -39,7 +39,6 @@ def _free(look: Session, sketch: Sketched, drawn: Drawn) -> Answer:
         focal_reason="" if stated else "estimated from the pattern, its ring taken as a circle",
         readings=drawn.readings,
         covered=drawn.fit.covered if sketch.structure == "circular" else 1.0,
-        upright=drawn.fit.pattern.upright,
     )
     return answer if sketch.structure != "hybrid" else _without_empty_middle(look, answer)
 

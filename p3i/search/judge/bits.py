@@ -12,6 +12,8 @@ to be worth b bits by chance (Kraft's inequality, and Markov's). That is what ac
 What a person asked for (a sketch, a start, the paper's recipe) needs no bits.
 """
 
+from dataclasses import replace
+
 from p3i.interp.compile import compile
 from p3i.interp.pattern import without_doubles
 from p3i.search.answer import Answer
@@ -29,6 +31,11 @@ def explained_bits(evidence: Evidence, answer: Answer) -> float:
 
     Fewer than two objects in sight explain nothing.
     """
+    return explained(evidence, answer).worth
+
+
+def explained(evidence: Evidence, answer: Answer) -> Answer:
+    """The answer with its `worth` in bits, its objects taken to stand as they explain most."""
     pattern = without_doubles(compile(answer.program))
     cells = sweeps_cells(pattern)
     pattern = in_shortest_steps(pattern) if cells else pattern
@@ -36,10 +43,12 @@ def explained_bits(evidence: Evidence, answer: Answer) -> float:
     index = pattern.index[evidence.in_sight(pattern, focal_mm=focal_mm)].double()
     cost = cost_bits(answer.program)
     if len(index) < 2:
-        return -cost
+        return replace(answer, worth=-cost)
     if pattern.turning is not None:
-        return as_it_stands(evidence, pattern, index, focal_mm=focal_mm)[1] - cost
-    return recurrence_bits(evidence, pattern, index, focal_mm=focal_mm, cells=cells) - cost
+        pattern, bits = as_it_stands(evidence, pattern, index, focal_mm=focal_mm)
+    else:
+        bits = recurrence_bits(evidence, pattern, index, focal_mm=focal_mm, cells=cells)
+    return replace(answer, worth=bits - cost, upright=pattern.upright)
 
 
 def worth_of_numbers(saved: float, *, numbers: int = 1) -> float:

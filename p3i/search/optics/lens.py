@@ -18,7 +18,7 @@ from p3i.search.config import MOST_K1
 from p3i.search.fit.places import follow, measured
 from p3i.search.fit.settle import Objects, Settled, objects_of, saved_bits, settled
 from p3i.search.forms.whole import scaled, whole_filling
-from p3i.search.judge.bits import explained_bits, worth_of_numbers
+from p3i.search.judge.bits import explained, explained_bits, worth_of_numbers
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.look.straight import Straightened, straightened
@@ -149,7 +149,7 @@ def _followed(evidence: Evidence, answer: Answer) -> Answer | None:
     fit = follow(evidence, start, rounds=3, free_focal=tells_focal(answer))
     focal_mm = fit.focal_mm if answer.focal_mm is not None else None
     answer = dataclasses.replace(answer, program=fit.filling.program(fit.z, ()), focal_mm=focal_mm)
-    return dataclasses.replace(answer, worth=explained_bits(evidence, answer))
+    return explained(evidence, answer)
 
 
 def _noted(answer: Answer, told: LensTold) -> Answer:
