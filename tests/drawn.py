@@ -31,6 +31,7 @@ class DrawnRing:
     """`count` flags of a `size` (program units) on a circle, those in `missing` left out.
 
     `slots` is how many would close the circle; `nudges` moves objects, in program units, along and across.
+    `upright` flags do not turn with the circle.
     """
 
     count: int = 12
@@ -46,6 +47,7 @@ class DrawnRing:
     nudges: Mapping[int, tuple[float, float]] | None = None
     canvas: Size = SMALL
     noise: float = 0.01
+    upright: bool = False
 
     @property
     def image_from_plane(self) -> np.ndarray:
@@ -67,7 +69,7 @@ class DrawnRing:
         for number, place in enumerate(self.places()):
             if number in self.missing:
                 continue
-            turn = math.radians(self.first_deg + 360 / self.slots * number)
+            turn = math.radians(-90 if self.upright else self.first_deg + 360 / self.slots * number)
             along = np.array([-math.sin(turn), math.cos(turn)])
             across = np.array([-along[1], along[0]])
             a, b = (self.nudges or {}).get(number, (0.0, 0.0))

@@ -238,6 +238,6 @@ def test_an_interrupt_while_the_lens_is_estimated_keeps_what_the_photo_showed(
 
 def test_once_interrupted_no_further_kind_of_pattern_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     image = DrawnRing(canvas=Size(224, 168)).image()
-    monkeypatch.setattr(proposers, "ring_guesses", lambda _: pytest.fail("searched on"))
+    monkeypatch.setattr(proposers, "ring_rounds", lambda *_: pytest.fail("searched on"))
     result = synthesize(image, SearchConfig(), progress=Said("straightening", 1))
     assert (result.program, result.stop) == (None, StopReason.INTERRUPTED)

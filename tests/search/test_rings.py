@@ -75,7 +75,7 @@ def test_a_search_whose_time_is_up_fits_one_ring_and_no_more(monkeypatch: pytest
     session.stopped = StopReason.TIME_UP
     numbers = RING.numbers(RING.filling())
     guesses = [Guess(RING.filling(), numbers, 1.0, focal_mm=35.0)] * 3
-    monkeypatch.setattr(proposers, "ring_guesses", lambda _: guesses)
+    monkeypatch.setattr(proposers, "ring_rounds", lambda *_: iter([guesses]))
     monkeypatch.setattr(synthesize_module, "fit_places", lambda _, guess: tried.append(guess))
     searched(session)
     assert len(tried) == 1

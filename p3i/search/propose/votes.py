@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import image_from_plane
 from p3i.search.fit.best import Best
-from p3i.search.fit.places import numbers_of
+from p3i.search.fit.places import FOCALS_MM, numbers_of
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
@@ -51,9 +51,6 @@ _POSES_A_CENTRE = 3
 _MOST_CLIMBED = 5
 # A circle of spots is worth as much as a centre with so many votes.
 _SPOTS_WORTH = 0.15
-TELE_MM = 100.0
-"""The long focal under which rings are looked for too: from three times the usual one on, tilted circles far
-from the middle are no circles under that one."""
 # The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
 _STEP_DEG = 6.0
 _STEP_SHARE = 0.08
@@ -106,7 +103,9 @@ def ring_rounds(look: Session, best: Best) -> Iterator[list[Guess]]:
     """
     yield _ring_guesses(look, look.evidence)
     if look.focal_is_free and not best.holds_closed_ring():
-        yield _ring_guesses(look, look.evidence.under(TELE_MM))
+        # The one half way to the longest that is believed, as lenses go.
+        long_mm = math.sqrt(look.evidence.focal_mm * FOCALS_MM[1])
+        yield _ring_guesses(look, look.evidence.under(long_mm))
 
 
 def _ring_guesses(look: Session, evidence: Evidence) -> list[Guess]:
