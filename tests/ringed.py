@@ -28,7 +28,7 @@ def guess_of(ring: DrawnRing) -> Guess:
 
 def proposes(patch: pytest.MonkeyPatch, *guesses: Guess) -> None:
     """Searches for rings begin with these guesses."""
-    patch.setattr(proposers, "ring_guesses", lambda _: list(guesses))
+    patch.setattr(proposers, "ring_rounds", lambda *_: iter([list(guesses)]))
 
 
 def found_ring(

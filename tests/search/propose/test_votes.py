@@ -7,12 +7,14 @@ from drawn import DrawnRing
 
 from p3i.interp.camera import rotation
 from p3i.search.config import SearchConfig
+from p3i.search.fit.best import Best
 from p3i.search.forms.guess import Guess
+from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.propose import votes as ring
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.views import gradient_tensor
-from p3i.search.propose.votes import Vote, ring_guesses, rotation_votes
+from p3i.search.propose.votes import Vote, ring_rounds, rotation_votes
 
 RING = DrawnRing()
 
@@ -26,7 +28,7 @@ def votes() -> list[Vote]:
 def guesses(votes: list[Vote]) -> list[Guess]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ring, "rotation_votes", lambda evidence: votes)  # cast once
-        return ring_guesses(Session(RING.evidence(), SearchConfig()))
+        return next(ring_rounds(Session(RING.evidence(), SearchConfig()), Best()))
 
 
 def test_rotations_vote_for_the_centre_of_a_tilted_ring(votes: list[Vote]) -> None:
@@ -86,3 +88,20 @@ def test_the_poses_reach_the_tilt_and_leave_no_gap() -> None:
 
 def _normal(rx_deg: float, ry_deg: float) -> np.ndarray:
     return np.asarray(rotation(rx_deg, ry_deg))[:, 2]
+
+
+@pytest.mark.parametrize(
+    ("stated", "closed", "focals"),
+    [(None, False, 2), (50.0, False, 1), (None, True, 1)],
+    ids=["free", "stated", "closed"],
+)
+def test_a_long_focal_is_tried_where_nobody_stated_one_and_no_closed_ring_was_found(
+    stated: float | None, closed: bool, focals: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Best, "holds_closed_ring", lambda _: closed)
+    config = SearchConfig(focal_mm=stated)
+    look = Session(Evidence(DrawnRing().image(), config, stated or 35.0), config)
+    told = [{guess.focal_mm for guess in guesses} for guesses in ring_rounds(look, Best())]
+    assert len(told) == focals
+    assert told[0] == {stated or 35.0}
+    assert all(mm is not None and mm > 80 for later in told[1:] for mm in later)
