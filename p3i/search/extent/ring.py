@@ -1,6 +1,5 @@
 """From a ring that was fitted to a program: where on it the objects are."""
 
-import itertools
 import math
 
 import numpy as np
@@ -11,12 +10,11 @@ from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import curve_score, follow, measured, numbers_of, values_of
 from p3i.search.fit.saved import saved_bits
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.patches import offsets_grid
 from p3i.search.look.session import Session
 
 # So many radii are tried for the objects.
 _MOST_PLACES = 2
-# Shifts at which upright objects are looked at, in steps of the ring.
-_SHIFTS = (-0.25, 0.0, 0.25)
 
 
 def drawn_ring(look: Session, fit: Fit) -> Drawn:
@@ -39,7 +37,7 @@ def _upright(evidence: Evidence, fit: Fit) -> Fit:
     middles: it is moved to where they stand out most.
     """
     values, found = values_of(fit), [fit]
-    for right, down in itertools.product(_SHIFTS, repeat=2):
+    for right, down in offsets_grid(3, samples_a_side=4).reshape(-1, 2).tolist():  # a quarter step each way
         x, y = values["draw.x.offset.1"] + right * fit.side, values["draw.y.offset.1"] + down * fit.side
         z = numbers_of(fit.filling, values | {"draw.x.offset.1": x, "draw.y.offset.1": y})
         moved = measured(evidence, fit.filling, z, focal_mm=fit.focal_mm, side=fit.side)

@@ -15,8 +15,6 @@ from p3i.search.fit.settle import objects_of, saved_bits, settled
 from p3i.search.judge.bits import worth_of_numbers
 from p3i.search.look.evidence import Evidence
 
-_ROUNDS = 5
-
 
 def with_paid_focal(evidence: Evidence, fit: Fit) -> Fit:
     """The fit with the focal that was assumed, where its own one does not pay for itself."""
@@ -29,7 +27,7 @@ def with_paid_focal(evidence: Evidence, fit: Fit) -> Fit:
     start = measured(evidence, fit.filling, numbers_of(fit.filling, values), focal_mm=assumed)
     if start is None:
         return fit
-    kept = follow(evidence, start, rounds=_ROUNDS)
+    kept = follow(evidence, start, rounds=3)
     objects = objects_of(evidence, fit.program(), focal_mm=fit.focal_mm)
     if objects is None:
         return fit
