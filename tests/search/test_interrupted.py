@@ -144,7 +144,7 @@ IN_A_CALL = [
     ("start", "extent.setting._best_extent", 1),
     ("paper", "propose.paper.equation2", 3),
     ("paper", "judge.answered.score_of_program", 2),
-    ("ring", "judge.answered.explained_bits", 1),
+    ("ring", "judge.answered.explained", 1),
     ("ring", "outcome.distinct_answers", 1),
 ]
 

@@ -45,8 +45,10 @@ _MOST_READ = 200
 # A sector of which less is known is none, and fewer than this many say nothing.
 _LEAST_KNOWN = 0.7
 _FEWEST = 3
-# This share of a sector's energy is told by nothing: objects and light differ, and numbers are rounded.
+# This share of a sector's energy is told by nothing: objects and light differ.
 _UNTOLD = 0.03
+# What rounding to 8 bits leaves of three colours, each from 0 to 100: uniform over one of 255 levels.
+_ROUNDING = 3 * (100 / 255) ** 2 / 12
 # What is fainter than this share of the plainest ring is none: that ring's objects reach there.
 _FAINT = 0.1
 
@@ -56,11 +58,13 @@ class Sectors:
     """The waves of sectors, `waves` complex [N, K, M]: K samples (rows and features) of M waves for each of
     N.
 
-    `energy` is what is typical of them before they were evened out.
+    `energy` is what is typical of their gradients before they were evened out, and `untold` the share of all
+    that nothing tells.
     """
 
     waves: NDArray[np.complex64]
     energy: float
+    untold: float
 
 
 def recurrence_bits(
@@ -87,17 +91,18 @@ def recurrence_bits(
         return sectors_of(evidence, pattern, part, theta, focal_mm=focal_mm, along=along, cells=cells)
 
     if cells:
-        return each * min(_bits(read(index, along).waves) for along in (0, 1))
+        return each * min(_bits(read(index, along)) for along in (0, 1))
     along = 1 if pattern.turning is None else pattern.turning
     ring = index[:, 1 - along]
     rings = [read(index[ring == one], along) for one in ring.unique()]
     plainest = max((one.energy for one in rings), default=0.0)
-    saved = each * sum(_bits(one.waves) for one in rings if one.energy >= _FAINT * plainest)
+    saved = each * sum(_bits(one) for one in rings if one.energy >= _FAINT * plainest)
     return max(saved - UPRIGHT_BITS * pattern.upright, 0.0)
 
 
-def _bits(waves: NDArray[np.complex64]) -> float:
-    """The bits of sectors with a mean one: waves [N, K, M]; the lowest waves that say most are taken."""
+def _bits(sectors: Sectors) -> float:
+    """The bits of sectors with a mean one; the lowest waves that say most are taken."""
+    waves = sectors.waves
     number = len(waves)
     if number < _FEWEST:
         return 0.0
@@ -108,7 +113,7 @@ def _bits(waves: NDArray[np.complex64]) -> float:
     best = 0.0
     for last in range(1, len(shared) + 1):
         total = samples[:last].sum()
-        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - _UNTOLD)
+        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - sectors.untold)
         if share > 1 / number:
             best = max(best, float(total) * likelihood_ratio(share, number))
     # One of so many choices was made.
@@ -168,8 +173,11 @@ def sectors_of(
     values = np.concatenate([_evened(gradients, seen), _evened(colours, seen)], 1)
     waves = np.fft.fft(values, axis=-1)[..., 1 : ALONG // 2].astype(np.complex64)
     enough = seen.mean((1, 2)) >= _LEAST_KNOWN
-    typical = float(np.median(_energy(gradients, seen))) if len(index) else 0.0
-    return Sectors(waves.reshape(len(waves), -1, waves.shape[-1])[enough], typical)
+    typical, colour = (
+        float(np.median(_energy(each, seen))) if len(index) else 0.0 for each in (gradients, colours)
+    )
+    untold = min(_UNTOLD + _ROUNDING / max(colour, _ROUNDING), 1.0)
+    return Sectors(waves.reshape(len(waves), -1, waves.shape[-1])[enough], typical, untold)
 
 
 def _points(
