@@ -14,7 +14,7 @@ from p3i.search.look.session import Session
 from p3i.search.look.upright import UPRIGHT_NOTE
 from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
-from p3i.search.optics.printed import as_precise_as_fitted
+from p3i.search.optics.printed import briefly
 from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
 from p3i.search.readings import offers, other_readings, reading_notes
 from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
@@ -31,7 +31,7 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
         answers = within_table1(look, answers)
-    written = answers if asked else [as_precise_as_fitted(look.evidence, answer) for answer in answers]
+    written = answers if asked else [briefly(look.evidence, answer) for answer in answers]
     printed = with_printed_scores(look.evidence, written, needed=needed)
     sure = [answer for answer in printed if suffices(answer, needed)]
     good = sure if asked else [answer for answer in sure if _in_sight(look, answer)]

@@ -146,7 +146,7 @@ class Fitted:
 
     def covariance(self, share: float, known: Tensor) -> Tensor:
         """The numbers' covariance [V, V]; `known` [V] is what else is known of each, as 1 / variance."""
-        return _inverse(share * self.information + torch.diag(known))
+        return inverse(share * self.information + torch.diag(known))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -286,7 +286,7 @@ def fitted(
         robust, variance = _weighed(residual, weights, variance)
         information = torch.einsum("nip,n,niq->pq", rows, robust / variance, rows)
         slope = torch.einsum("nip,n,ni->p", rows, robust / variance, residual) + known * (numbers - mean)
-        step = -_inverse(information + torch.diag(known)) @ slope / limits
+        step = -inverse(information + torch.diag(known)) @ slope / limits
         worst = float(step.abs().max())
         if steps == _MOST_STEPS or not math.isfinite(worst) or worst < _SETTLED:
             break
@@ -332,7 +332,7 @@ def _alike(points: Tensor, left: Tensor) -> float:
     return 0.0 if shared <= chance else min(shared * (1 - (chance / shared) ** 2), _MOST_ALIKE)
 
 
-def _inverse(matrix: Tensor) -> Tensor:
+def inverse(matrix: Tensor) -> Tensor:
     """The inverse of a matrix of information, whose empty directions stay as good as unknown."""
     scale = matrix.diagonal().clamp(min=1e-12).rsqrt()
     even = matrix * scale[:, None] * scale + 1e-9 * torch.eye(len(matrix), dtype=matrix.dtype)

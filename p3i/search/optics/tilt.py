@@ -13,7 +13,6 @@ import math
 import torch
 from torch import Tensor
 
-from p3i.grammar.ast import Program
 from p3i.search.answer import Answer
 from p3i.search.fit.settle import Fitted, objects_of, settled
 from p3i.search.judge.evaluate import without_lens
@@ -35,27 +34,16 @@ def pose_sigma_deg(evidence: Evidence, answer: Answer) -> float | None:
     """
     evidence = evidence.under(answer.focal_mm or evidence.focal_mm)
     evidence, program = without_lens(evidence, answer.program, answer.lens_k1)
-    known = covariance_of_program(evidence, program, free_focal=tells_focal(answer))
-    if known is None:
-        return None
-    # The camera's angles are the first of a program's numbers.
-    sigma_deg = sigma_of_normal_deg(known[:2, :2], rx_deg=program.camera.rx_deg)
-    return sigma_deg if math.isfinite(sigma_deg) else None
-
-
-def covariance_of_program(evidence: Evidence, program: Program, *, free_focal: bool = False) -> Tensor | None:
-    """The covariance [V, V] of a program's free numbers, as `whole_filling` has them, under evidence's focal.
-
-    With `free_focal` the focal is told by the places as well. None where the photo shows fewer than two
-    objects.
-    """
     objects = objects_of(evidence, program)
     if objects is None:
         return None
-    fit = settled(objects, *(("focal",) if free_focal else ()))
-    known = torch.zeros(len(fit.fit.numbers))
+    told = settled(objects, *(("focal",) if tells_focal(answer) else ()))
+    known = torch.zeros(len(told.fit.numbers))
     known[:2] = _TILT_SPREAD_DEG**-2
-    return covariance_of(fit.fit, objects.numbers, known=known, share=fit.share)
+    covariance = covariance_of(told.fit, objects.numbers, known=known, share=told.share)
+    # The camera's angles are the first of a program's numbers.
+    sigma_deg = sigma_of_normal_deg(covariance[:2, :2], rx_deg=program.camera.rx_deg)
+    return sigma_deg if math.isfinite(sigma_deg) else None
 
 
 def tells_focal(answer: Answer) -> bool:
