@@ -161,7 +161,7 @@ def level_of_unit_energy(
 
 NO_REFINEMENT: tuple[Replacement, ...] = (
     ("p3i.search.fit.grow.refine", as_proposed),
-    ("p3i.search.fit.grow.fit_instances", as_proposed),
+    ("p3i.search.fit.grow.on_instances", as_proposed),
     ("p3i.search.extent.lattice.refitted", lambda _, layout: layout),
 )
 NO_LOCAL: tuple[Replacement, ...] = (("p3i.vision.features.locally_normalized", as_they_are),)

@@ -5,7 +5,7 @@ from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.forms.asked import asks_for_itself, needed_for, stated_focal, why_not
-from p3i.search.judge.accept import faint_note, false_alarms, suffices, with_printed_scores
+from p3i.search.judge.accept import false_alarms, suffices, with_printed_scores
 from p3i.search.judge.probability import Signs, probability
 from p3i.search.judge.region import centers_px, region_px, share_in_sight
 from p3i.search.judge.same import distinct_answers
@@ -25,8 +25,8 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     """The best of the answers as the result of the search, or why none of them is one."""
     config, image, focal_mm = look.config, look.evidence.image, assumed[0]
     # What a person asked for is theirs to choose, whatever it costs.
-    asked, agreed = asks_for_itself(config), needed_for(config)
-    needed = agreed if asked else None
+    asked = asks_for_itself(config)
+    needed = needed_for(config) if asked else None
     if config.focal_mm == "auto":
         answers = [with_own_focal(answer, size=image.size, assumed=assumed) for answer in answers]
     if config.strict:
@@ -37,23 +37,16 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     good = sure if asked else [answer for answer in sure if _in_sight(look, answer)]
     if not good:
         best = max((answer.score for answer in printed), default=0.0)
-        costly = not asked and best >= agreed
-        reason = StopReason.OUT_OF_SIGHT if sure else StopReason.COSTS_MORE if costly else why_not(config)
+        reason = StopReason.OUT_OF_SIGHT if sure else why_not(config)
         if look.unwritable and not sure:
             reason = StopReason.OUTSIDE_TABLE_1
-        least, stop = look.evidence.least_period_px, look.stopped or reason
         bits = None if asked else max((answer.worth for answer in printed), default=None)
-        facts = {"agreement": best, "bits": bits, "least_period_px": least, "needed": needed}
-        refused = told(config, assumed, None, stop, **facts)
-        look.record("answer", program=None, score=best, reason=refused.reason)
-        return refused
+        facts = {"bits": bits, "least_period_px": look.evidence.least_period_px, "needed": needed}
+        return _refused(look, assumed, look.stopped or reason, best, **facts)
     good = distinct_answers(good, image=image, focal_mm=focal_mm)
     first = good[0]
     if not offers(first, config):
-        stop = StopReason.NO_SUCH_OBJECT
-        refused = told(config, assumed, None, stop, agreement=first.score, readings=first.readings)
-        look.record("answer", program=None, score=first.score, reason=refused.reason)
-        return refused
+        return _refused(look, assumed, StopReason.NO_SUCH_OBJECT, first.score, readings=first.readings)
     elsewhere = other_readings(look, first, most=config.top - 1)
     listed = [first, *elsewhere, *good[1:]][: config.top]
     signs = [_signs(look, answer, good) for answer in listed]
@@ -70,9 +63,6 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
     if look.unwritable - {first.structure}:
         notes = (*notes, unwritable_note(look))
     centers = centers_px(first.program, image, first.focal_mm or focal_mm, lens_k1=first.lens_k1)
-    by_score = first.score >= agreed
-    if not by_score and config.extent_used == "found":
-        notes = (*notes, faint_note(first, len(centers)))
     look.tell("done", 1.0)
     look.record("answer", program=first.program, score=first.score, focal=first.focal_mm or focal_mm)
     return told(
@@ -86,7 +76,7 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         bits=None if asked else first.worth,
         margin_bits=margin_bits,
         margin=margin,
-        needed=agreed if by_score else None,
+        needed=needed,
         false_alarms=None if asked else false_alarms(first.worth),
         candidates=tuple(
             Candidate(
@@ -115,6 +105,15 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         notes=notes,
         **_focal_facts(first, assumed),
     )
+
+
+def _refused(
+    look: Session, assumed: tuple[float, FocalSource], stop: StopReason, score: float, **more: object
+) -> SynthesisResult:
+    """No answer, the best of those that were found having this score."""
+    refused = told(look.config, assumed, None, stop, agreement=score, **more)
+    look.record("answer", program=None, score=score, reason=refused.reason)
+    return refused
 
 
 def _signs(look: Session, answer: Answer, good: list[Answer]) -> Signs:

@@ -45,7 +45,6 @@ class StopReason(Enum):
     TIME_UP = "the time was up before the search had ended"
     INTERRUPTED = "interrupted before the search had ended"
     NO_PATTERN = "no regular pattern"
-    COSTS_MORE = "no regular pattern: what repeats is less than the program takes to write"
     OUT_OF_SIGHT = "no regular pattern: most objects of what was found would lie outside the picture"
     NO_FIT = "the sketch does not fit this photo"
     OUTSIDE_TABLE_1 = "the pattern that was found cannot be written in the paper's Table 1, as strict asks"
@@ -162,11 +161,10 @@ class SynthesisResult:
     `agreement` is how well the objects predict each other, 0 to 1, and `bits` what the program explains of
     the photo less what it costs: both are evidence for the answer.
     `program` is None where nothing convinced; then there is no score, `agreement` and `bits` are the best
-    that were seen, if any, and `needed` is the agreement that would have done. `needed` is None for an answer
-    of less agreement: one that `false_alarms` convinced of, or that fills the picture. `false_alarms` is the
-    number of finds as good as this one that are expected in a picture without a pattern, None where a person
-    asked for it and where there is no program. `margin_bits` is the lead over the best candidate of
-    another meaning, and `margin` its share of the bits, 0 to 1.
+    that were seen, if any. `needed` is the agreement that what a person asked for must reach, None for
+    others, which need bits. `false_alarms` is the number of finds as good as this one that are expected in a
+    picture without a pattern, None where a person asked for it and where there is no program. `margin_bits`
+    is the lead over the best candidate of another meaning, and `margin` its share of the bits, 0 to 1.
     `centers` are the objects of `program` on the photo: (x, y) in pixels, pixel centres at whole numbers,
     and the loop indices (i, j). `focal_mm` is the focal that `program` is told with, and `focal_reason` says
     why, for people; without a program it is the one assumed. `candidates` are in order, the best first, at

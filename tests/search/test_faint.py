@@ -53,7 +53,6 @@ def test_a_board_of_three_hundred_faint_cells_is_answered_by_what_they_explain_t
 def test_nothing_says_that_such_an_answer_needs_a_score() -> None:
     found = answer()
     assert found.needed is None and "needs" not in found.reason
-    assert any("together they explain" in note for note in found.notes)
 
 
 def test_its_agreement_is_the_one_that_score_says(tmp_path) -> None:

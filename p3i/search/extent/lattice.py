@@ -10,8 +10,6 @@ from p3i.search.forms.layout import Layout
 from p3i.search.look.contrast import score_of
 from p3i.search.look.session import Session
 
-_ROUNDS = 4
-
 
 def drawn_lattice(look: Session, fit: Fit) -> Drawn | None:
     """The surest reading of a fit's ground: with its primitive cell, or either where it may be two."""
@@ -20,7 +18,7 @@ def drawn_lattice(look: Session, fit: Fit) -> Drawn | None:
     middle = fit.index[fit.support].median(0).values
     theta = Lattice.of(pattern, fit.theta).moved_to(middle.numpy()).theta(pattern)
     selected = fit.index[fit.support] - middle
-    last = follow(evidence, pattern, theta, selected, generator=look.generator, rounds=_ROUNDS, finest=True)
+    last = follow(evidence, pattern, theta, selected, finest=True)
     if last is None or int(last.support.sum()) < FEWEST_OBJECTS:
         return None
     readings = primitive(evidence, pattern, last)

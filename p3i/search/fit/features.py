@@ -9,50 +9,18 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
+from p3i.search.fit.robust import step_limits
 from p3i.search.fit.slopes import with_slopes
-from p3i.search.forms.filling import Filling
 from p3i.search.look.cells import sample_grid, sample_points
 from p3i.search.look.evidence import Level
 from p3i.vision.warp import sample, sample_valid
 
-MOST_TURN_DEG = 4.0
-"""One step moves the camera by at most so many degrees, ..."""
-# ... and any other number by at most this share of the pattern's step.
-_MOST_CHANGE = 0.08
 # A step this small against those limits ends the refinement.
 _CONVERGED = 2e-3
 # Levenberg damping, relative to the diagonal.
 _DAMPING = 1e-3
-ROBUST_SCALE = 2.0
-"""Residuals beyond so many times what is typical of them count less and less (a Cauchy weight)."""
-
-
-def step_limits(pattern: Pattern, theta: Tensor, *, fixed: frozenset[str] = frozenset()) -> Tensor:
-    """The most that one step may move each number of theta [P]: [P], 0 for the fixed ones.
-
-    Zeros that scale a loop variable may move too: the limit comes from the largest number of their kind.
-    """
-    values = dict(zip(pattern.paths, theta.tolist(), strict=True))
-
-    def limit(path: str) -> float:
-        if path in fixed:
-            return 0.0
-        if path.startswith("camera."):
-            return MOST_TURN_DEG
-        variable = path.rsplit(".", 1)[1]
-        # A constant may move as far as the loops' own steps.
-        alike = ("i", "j") if variable == "1" else (variable,)
-        steps = [abs(value) for name, value in values.items() if name.rsplit(".", 1)[1] in alike]
-        return _MOST_CHANGE * max(*steps, 1e-3)
-
-    return torch.tensor([limit(path) for path in pattern.paths], dtype=torch.float64)
-
-
-def moving_limits(filling: Filling, z: Tensor) -> Tensor:
-    """The most that one step may move each number of a filling, z [F]: [F], as `step_limits`."""
-    limits = step_limits(filling.pattern, filling.theta(z)).tolist()
-    named = dict(zip(filling.pattern.paths, limits, strict=True))
-    return torch.tensor([named[unknown.name] for unknown in filling.moving], dtype=torch.float64)
+# Residuals beyond so many times what is typical of them count less and less (a Cauchy weight).
+_ROBUST_SCALE = 2.0
 
 
 def refine(
@@ -107,7 +75,7 @@ def _step(values: Tensor, slopes: Tensor, jacobian: Tensor, weights: Tensor) -> 
     residual = values - _mean(values, weights)
     squared = residual.square().sum(-1)
     typical = squared[weights > 0].median() if bool((weights > 0).any()) else squared.new_ones(())
-    weights = weights / (1 + squared / (ROBUST_SCALE**2 * typical + 1e-6))
+    weights = weights / (1 + squared / (_ROBUST_SCALE**2 * typical + 1e-6))
     residual = values - _mean(values, weights)
     rows = torch.einsum("nkdc,nkdp->nkcp", slopes, jacobian)
     rows = rows - _mean(rows, weights)  # the mean cell moves along

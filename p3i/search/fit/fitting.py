@@ -43,7 +43,7 @@ def fit_places(look: Session, guess: Guess) -> Fit | None:
         focal_mm = look.evidence.focal_mm
         return Fit(guess.filling, guess.z, focal_mm, 0.0, cells, nothing, covered=guess.promise)
     if guess.filling is lattice_filling():
-        return grow(look.evidence, guess, generator=look.generator)
+        return grow(look.evidence, guess)
     if guess.focal_mm is None:
         setting = guess.filling.settings[guess.setting]
         filling = with_settings(guess.filling, (setting,))

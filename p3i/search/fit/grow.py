@@ -17,26 +17,27 @@ from p3i.interp.pattern import Pattern
 from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.features import refine
 from p3i.search.fit.fitted import SUPPORT, Fit
-from p3i.search.fit.robust import fit_instances
+from p3i.search.fit.robust import fitted, step_limits
 from p3i.search.forms.guess import Guess, tilted
-from p3i.search.forms.lattice import (
-    PHASE,
-    Lattice,
-    cell_areas,
-    cell_px,
-    cells_in_view,
-    map_from_index,
-)
+from p3i.search.forms.lattice import PHASE, Lattice, cell_areas, cell_px, cells_in_view, map_from_index
 from p3i.search.forms.spelled import lattice_filling
-from p3i.search.look.cells import HALF_STEPS, agreement, contrast, mean_cell, members, read_cells, sample_grid
-from p3i.search.look.correlate import find_instances
+from p3i.search.look.cells import (
+    HALF_STEPS,
+    agreement,
+    contrast,
+    mean_cell,
+    members,
+    read_cells,
+    sample_grid,
+    sample_points,
+)
+from p3i.search.look.correlate import Instances, find_instances
 from p3i.search.look.evidence import Evidence, Level
+from p3i.search.look.patches import in_units_of_noise
 
 # Growth looks this many cells beyond those that agree.
 _REACH = 2
 _ROUNDS = 9
-# More cells than this are not needed for one step of the refinement.
-_MOST_REFINED = 160
 # The tilts under which a proposal without one is tried.
 _TILTS_DEG = (0.0, 35.0, 55.0)
 
@@ -63,32 +64,25 @@ def weighed(level: Level, pattern: Pattern, theta: Tensor, index: Tensor, contra
     return Fit(filling, filling.z_of(theta), level.focal_mm, 0.0, index, contrast, covered=score)
 
 
-def grow(evidence: Evidence, guess: Guess, *, generator: torch.Generator) -> Fit | None:
+def grow(evidence: Evidence, guess: Guess) -> Fit | None:
     """Refine a guess and follow it as far as the pattern goes; None where there is nothing to follow."""
     pattern = guess.filling.pattern
-    start = _seed(evidence, pattern, guess)
+    start = _local_seed(evidence, pattern, guess) if guess.local else _seed(evidence, pattern, guess)
     if start is None:
         return None
-    theta, selected, weights = start
+    theta, cells, weights = start
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
-    theta = refine(level, pattern, theta, index=selected, weights=weights, fixed=PHASE)
-    return follow(evidence, pattern, theta, selected, generator=generator, rounds=_ROUNDS)
+    theta = refine(level, pattern, theta, index=cells, weights=weights, fixed=PHASE)
+    return follow(evidence, pattern, theta, cells)
 
 
 def follow(
-    evidence: Evidence,
-    pattern: Pattern,
-    theta: Tensor,
-    selected: Tensor,
-    *,
-    generator: torch.Generator,
-    rounds: int,
-    finest: bool = False,
+    evidence: Evidence, pattern: Pattern, theta: Tensor, selected: Tensor, *, finest: bool = False
 ) -> Fit | None:
     """Find the instances around cells `selected` [N, 2], fit theta [P] to them, take in more; repeat."""
     best: Fit | None = None
     previous: set[tuple[float, ...]] = set()
-    for turn in range(rounds):
+    for turn in range(_ROUNDS):
         if not sane(pattern, theta):
             break
         level = evidence.level_for(side_of_cell(evidence, pattern, theta), finest=finest)
@@ -102,20 +96,33 @@ def follow(
         if len(now) < FEWEST_OBJECTS or (turn >= 2 and len(now ^ previous) <= 0.04 * len(now)):
             break
         previous = now
-        few = _sample_of(len(selected), generator)
-        found = find_instances(
-            level, pattern, theta, selected[few], torch.where(weights > SUPPORT, weights, 0.0)[few]
-        )
+        found = find_instances(level, pattern, theta, selected, weights)
         if int((found.certainty > 0).sum()) < FEWEST_OBJECTS:
             break
-        theta = fit_instances(level, pattern, theta, found, weights=found.certainty.double())
+        theta = on_instances(level, pattern, theta, found)
     return best
+
+
+def on_instances(level: Level, pattern: Pattern, theta: Tensor, found: Instances) -> Tensor:
+    """Theta [P] moved so that the program's points fall on the instances.
+
+    Offsets are compared in index units, so that near and far objects count alike.
+    """
+    half = 0.25 * torch.eye(2, dtype=torch.float64)
+    ends = (found.index[:, None, None] + torch.stack([half, -half])).reshape(-1, 2)
+    ahead, behind = sample_points(level, pattern, theta, ends)[0].reshape(-1, 2, 2, 2).unbind(1)
+    return fitted(
+        lambda numbers: sample_points(level, pattern, numbers, found.index)[0],
+        theta,
+        places=sample_points(level, pattern, theta, found.index + found.offsets)[0],
+        whiten=in_units_of_noise(2 * (ahead - behind).mT),
+        weights=found.certainty.double(),
+        limits=step_limits(pattern, theta),
+    ).numbers
 
 
 def _seed(evidence: Evidence, pattern: Pattern, guess: Guess) -> tuple[Tensor, Tensor, Tensor] | None:
     """Where to start: theta, cells [N, 2] and their weights [N]."""
-    if guess.local:
-        return _local_seed(evidence, pattern, guess)
     theta = guess.lattice.reduced().theta(pattern)
     level = evidence.level_for(side_of_cell(evidence, pattern, theta))
     index = cells_in_view(level, pattern, theta)
@@ -148,9 +155,7 @@ def _local_seed(evidence: Evidence, pattern: Pattern, guess: Guess) -> tuple[Ten
         share = (mean.square().sum(-1) / _mean_energy(cells.values, cells.known)).mean()
         if best is None or float(share) > best[0]:
             best = float(share), theta
-    if best is None:
-        return None
-    return best[1], index[near], torch.ones(int(near.sum()))
+    return None if best is None else (best[1], index[near], torch.ones(int(near.sum())))
 
 
 def _tilts() -> list[tuple[float, float]]:
@@ -192,7 +197,10 @@ def _neighbour_contrast(level: Level, pattern: Pattern, theta: Tensor, index: Te
 
 
 def _grown(fit: Fit, selected: Tensor) -> tuple[Tensor, Tensor]:
-    """The cells for the next round: those that agree and hang together with the present ones, and a rim."""
+    """The cells for the next round: those that agree and hang together with the present ones, and a rim.
+
+    With how much each says of what all are like.
+    """
     index = fit.index.numpy().astype(int)
     low = index.min(0) - _REACH - 1
     shape = tuple(index.max(0) - low + _REACH + 2)
@@ -212,7 +220,8 @@ def _grown(fit: Fit, selected: Tensor) -> tuple[Tensor, Tensor]:
     kept = agreeing & wider(mask(selected.numpy().astype(int)))
     wanted = kept | wider(kept)
     chosen = torch.from_numpy(wanted[tuple((index - low).T)].astype(bool))
-    return fit.index[chosen], fit.contrast[chosen].clamp(min=0.02)
+    contrast = fit.contrast[chosen]
+    return fit.index[chosen], torch.where(contrast > SUPPORT, contrast, 0.0)
 
 
 def _smoothed(index: Tensor, values: Tensor) -> Tensor:
@@ -224,13 +233,6 @@ def _smoothed(index: Tensor, values: Tensor) -> Tensor:
     kernel = np.array([[0, 1, 0], [1, 2, 1], [0, 1, 0]], np.float32) / 6
     mean = cv2.filter2D(plane, -1, kernel, borderType=cv2.BORDER_CONSTANT)
     return torch.from_numpy(mean[tuple((whole - low).T)])
-
-
-def _sample_of(count: int, generator: torch.Generator) -> Tensor:
-    """At most _MOST_REFINED positions out of `count`, in order."""
-    if count <= _MOST_REFINED:
-        return torch.arange(count)
-    return torch.randperm(count, generator=generator)[:_MOST_REFINED].sort().values
 
 
 def side_of_cell(evidence: Evidence, pattern: Pattern, theta: Tensor) -> float:

@@ -21,18 +21,11 @@ from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.config import FEWEST_OBJECTS, SearchConfig
 from p3i.search.fit.fitted import FEWEST_SEEN
+from p3i.search.fit.places import objects_about
 from p3i.search.forms.lattice import Lattice, cell_px, cells_in_view, in_shortest_steps
 from p3i.search.look.cells import HALF_STEPS, contrast, members, sample_grid, sample_points
 from p3i.search.look.evidence import Evidence, Level
-from p3i.search.look.patches import (
-    find_objects,
-    frames,
-    half_steps,
-    misfit,
-    patch_contrast,
-    spacing,
-    whitening,
-)
+from p3i.search.look.patches import half_steps, misfit, patch_contrast, spacing
 from p3i.search.look.thinned import thinned
 from p3i.search.look.upright import as_it_stands
 
@@ -46,8 +39,6 @@ _MOST_IN_VIEW = 4000
 # The places of a sector: shares of the radius that is drawn, and of the step along the curve.
 _RADII = (1.0, 0.9, 0.8, 1.1)
 _TURNS = (0.0, 0.5)
-# What is seen of an object's place counts at least so much in the mean that it is searched by.
-_LEAST_WEIGHT = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,13 +158,11 @@ def _misfit(
 ) -> float:
     """How far the objects about the draws `index` [N, 2] lie from them; infinite where none has a place."""
     focal_mm = evidence.focal_mm
-    weights = contrast.clamp(min=_LEAST_WEIGHT)
-    found = find_objects(evidence, pattern, theta, index, weights, side=side, focal_mm=focal_mm)
-    certainty = found.certainty.double()
-    if float(certainty.sum()) <= 0:
+    there = objects_about(evidence, pattern, theta, index, contrast, side=side, focal_mm=focal_mm)
+    if float(there.certainty.sum()) <= 0:
         return float("inf")
-    where = frames(pattern, theta, index, side=side)
-    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    there, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
-    here, _ = project(matrix, where.origin)
-    return misfit(here - there, whiten=whitening(matrix, where), certainty=certainty)
+    here, _ = project(
+        pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm),
+        pattern.points_at(index, theta),
+    )
+    return misfit(here - there.px, whiten=there.whiten, certainty=there.certainty)

@@ -5,27 +5,28 @@ program's free numbers, the focal among them where it is free, are fitted to the
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from p3i.interp.camera import project
-from p3i.search.fit.features import MOST_TURN_DEG
+from p3i.interp.pattern import Pattern
 from p3i.search.fit.fitted import FEWEST_SEEN, Fit
-from p3i.search.fit.robust import robust_fit
+from p3i.search.fit.robust import fitted as fitted_to
+from p3i.search.fit.robust import moving_limits
 from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import score_of_curve
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import areas_px, find_objects, frames, misfit, patch_contrast, spacing, whitening
+from p3i.search.look.patches import areas_px, find_about, frames, misfit, patch_contrast, spacing, whitening
 from p3i.search.look.session import Session
 
 FOCALS_MM = (20.0, 300.0)
 """Within these a focal that nobody stated may go, 35 mm-equivalent."""
 FOCAL_SPREAD = 0.7
 """Spread of the prior on the logarithm of the focal: a phone or a lens from 24 to 50 mm is no surprise."""
-# One step moves lengths by at most this share of a patch.
-_MOST_SHIFT = 0.4
+# An object counts at least so much in what all are like.
+_LEAST_WEIGHT = 0.02
 MOST_ZOOM = 0.15
 """One step moves the focal's logarithm by at most this."""
 
@@ -50,6 +51,36 @@ def measured(
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Where a photo shows the objects about draws: `px` [N, 2], how sure each is [N], 0 where none is found.
+
+    `whiten` [N, 2, 2] takes differences of places to units of their noise.
+    """
+
+    px: Tensor
+    certainty: Tensor
+    whiten: Tensor
+
+
+def objects_about(
+    evidence: Evidence,
+    pattern: Pattern,
+    theta: Tensor,
+    index: Tensor,
+    weights: Tensor,
+    *,
+    side: float,
+    focal_mm: float,
+) -> Places:
+    """Where the objects about the draws `index` [N, 2] are, `weights` [N] making what all are like."""
+    where = frames(pattern, theta, index, side=side)
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    found = find_about(evidence, matrix, where, index, weights.clamp(min=_LEAST_WEIGHT))
+    px, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
+    return Places(px, found.certainty.double(), whitening(matrix, where))
+
+
 def registered(
     evidence: Evidence, fit: Fit, *, free_focal: bool = False, keep_side: bool = False
 ) -> Fit | None:
@@ -57,50 +88,44 @@ def registered(
 
     `keep_side`: the patches stay as wide as they are, whatever becomes of the distance of the draws.
     """
-    filling, pattern = fit.filling, fit.filling.pattern
-    weights = fit.contrast.clamp(min=0.02)
-    found = find_objects(
-        evidence, pattern, fit.theta, fit.index, weights, side=fit.side, focal_mm=fit.focal_mm
+    filling, pattern, size = fit.filling, fit.pattern, evidence.image.size
+    there = objects_about(
+        evidence, pattern, fit.theta, fit.index, fit.contrast, side=fit.side, focal_mm=fit.focal_mm
     )
-    certainty = found.certainty.double()
-    if int((certainty > 0).sum()) < FEWEST_SEEN:
+    if int((there.certainty > 0).sum()) < FEWEST_SEEN:
         return None
-    size = evidence.image.size
-    where = frames(pattern, fit.theta, fit.index, side=fit.side)
-    matrix = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm)
-    targets, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
-    whiten = whitening(matrix, where)
 
     def points_of(numbers: Tensor) -> Tensor:
         theta = filling.theta(numbers[..., :-1])
         seen = pattern.image_from_plane(theta, size=size, focal_mm=numbers[..., -1].exp())
         return project(seen, pattern.points_at(fit.index, theta))[0]
 
-    def fitted(focal_mm: float, *, free: bool) -> Tensor:
+    def at_places(focal_mm: float, *, free: bool) -> Tensor:
         start = torch.cat([fit.z, torch.tensor([math.log(focal_mm)], dtype=torch.float64)])
-        prior = torch.zeros(len(start), 2, dtype=torch.float64)
-        prior[-1, 0], prior[-1, 1] = math.log(evidence.focal_mm), FOCAL_SPREAD**-2
-        return robust_fit(
+        mean, known = torch.zeros_like(start), torch.zeros_like(start)
+        mean[-1], known[-1] = math.log(evidence.focal_mm), FOCAL_SPREAD**-2
+        zoom = torch.tensor([MOST_ZOOM if free else 0.0], dtype=torch.float64)
+        return fitted_to(
             points_of,
             start,
-            targets=targets,
-            whiten=whiten,
-            weights=certainty,
-            limits=_limits(fit, MOST_ZOOM if free else 0.0),
-            prior=prior,
-            iterations=8,
-        )
+            places=there.px,
+            whiten=there.whiten,
+            weights=there.certainty,
+            limits=torch.cat([moving_limits(filling, fit.z), zoom]),
+            mean=mean,
+            known=known,
+        ).numbers
 
     focal_mm = fit.focal_mm
-    numbers = fitted(focal_mm, free=free_focal)
+    numbers = at_places(focal_mm, free=free_focal)
     if free_focal:
         told = float(numbers[-1].exp())
         focal_mm = min(max(told, FOCALS_MM[0]), FOCALS_MM[1])
         if focal_mm != told and math.isfinite(told):  # the others are to belong to the focal that stays
-            numbers = fitted(focal_mm, free=False)
+            numbers = at_places(focal_mm, free=False)
     if not bool(torch.isfinite(numbers).all()):
         return None
-    cost = misfit(points_of(numbers) - targets, whiten=whiten, certainty=certainty)
+    cost = misfit(points_of(numbers) - there.px, whiten=there.whiten, certainty=there.certainty)
     side = fit.side if keep_side else None
     moved = measured(evidence, filling, numbers[:-1], focal_mm=focal_mm, side=side)
     return None if moved is None else replace(moved, cost=cost)
@@ -154,18 +179,3 @@ def values_of(fit: Fit) -> dict[str, float]:
 def numbers_of(filling: Filling, values: dict[str, float]) -> Tensor:
     """The numbers of a filling [F] in its order."""
     return torch.tensor([values[unknown.name] for unknown in filling.moving], dtype=torch.float64)
-
-
-def _limits(fit: Fit, zoom: float) -> Tensor:
-    """The most that one step may move each free number, and `zoom` for the focal's logarithm: [F + 1]."""
-    radius = max(float(fit.filling.pattern.centers(fit.theta).std(0).norm()), fit.side)
-    limits = []
-    for unknown in fit.filling.moving:
-        name = unknown.name
-        if name.startswith("camera."):
-            limits.append(MOST_TURN_DEG)
-        elif ".angle." in name:
-            limits.append(math.degrees(_MOST_SHIFT * fit.side / radius))
-        else:
-            limits.append(_MOST_SHIFT * fit.side)
-    return torch.tensor([*limits, zoom], dtype=torch.float64)

@@ -8,8 +8,6 @@ from p3i.search.look.recurrence import recurrence_bits
 
 def saved_bits(evidence: Evidence, fit: Fit) -> float:
     """What the objects of a fit save by coming again at its steps: look/recurrence.py."""
-    if len(fit.index) < 2:
-        return 0.0
     cells = sweeps_cells(fit.pattern)
     return recurrence_bits(
         evidence, fit.pattern, fit.index, focal_mm=fit.focal_mm, cells=cells, theta=fit.theta

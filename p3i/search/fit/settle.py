@@ -2,21 +2,13 @@
 
 Each object is looked for around where the program draws it, and all numbers are fitted to the places: those
 of the program, and with them such as a camera may have besides, a focal, a lens, or a plane that is bent.
-What the latter are worth is told in bits of the places' code length, under one model of their noise:
-
-    length = sum over the objects of ln s^2 + 3 ln(1 + r^2 / 4 s^2)
-
-with r a residual in units of `look/patches.whitening`, and s the scale that the residuals themselves show: a
-Student t of 4 degrees of freedom in the picture's two directions (Lange, Little and Taylor 1989), under which
-what stands off its plane has little to say. Neighbours that stray alike are no independent witnesses: a
-lens, or a page that is not flat, makes many objects say no more than a few.
+What the latter are worth is told in bits of the places' code length, under the noise of `fit/robust.py`.
 
 Convention: N objects, V numbers: the free ones of the program (`forms/whole.py`), then those of the camera.
 Places are pixels of the photo as it was taken.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -26,9 +18,8 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.interp.camera import FILM_MM, project, rotation
 from p3i.interp.lens import photo_from_straight
-from p3i.search.fit.features import moving_limits
 from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
-from p3i.search.fit.slopes import with_slopes
+from p3i.search.fit.robust import Fitted, fitted, moving_limits
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.whole import whole_filling
 from p3i.search.look.evidence import Evidence
@@ -45,14 +36,6 @@ _MOST_FOUND = 150
 _FEWEST = 2
 # Each is looked for twice, the second time in so many samples along a side.
 _CLOSER_SIDE = 24
-# Degrees of freedom of the noise. Of its scale it says (4 + 2) / (4 + 4) of what a Gaussian would.
-_TAIL = 4.0
-# The scale of residuals, in units of `whitening`: where to begin, and the least that is believed, which is a
-# fiftieth of a pixel; interpolation between pixels is no better.
-_VARIANCE, _LEAST_VARIANCE = 0.25, 0.0044
-_MOST_STEPS, _SCALINGS = 20, 5
-_SETTLED = 1e-3
-_MOST_ALIKE = 0.6
 # A camera's numbers: how many they are, the most of one step, and their spread before anything is seen. A
 # bend is the height of the plane as a quadratic, in units of the pattern's reach.
 _NUMBERS: dict[Free, int] = {"focal": 1, "lens": 1, "bend": 3}
@@ -65,8 +48,8 @@ class Objects:
     """The objects of a program, and where the photo shows them.
 
     `numbers` are the program's free ones in `filling`, `index` [N, 2] the objects found, at `places` [N, 2].
-    `whiten` [N, 2, 2] takes differences of places to units of their noise, `weights` [N] have the mean 1.
-    Each object stands for `each`, of a pattern that runs in so many `directions`. The program was written
+    `whiten` [N, 2, 2] takes differences of places to units of their noise, `weights` [N] say how sure each
+    is. Each object stands for `each`, of a pattern that runs in so many `directions`. The program was written
     under `focal_mm`, on a `canvas` straightened of a lens `k1` of a photo of `size`; `expected_mm` is what
     the focal would be taken for if the objects did not tell.
     """
@@ -120,33 +103,6 @@ class Objects:
         focal = torch.as_tensor(focal_mm, dtype=at.dtype)[..., None, None] * (100 / FILM_MM)
         scale = self.canvas.unit_px / (1 + at[..., 2:] / focal)
         return at[..., :2] * scale + at.new_tensor(self.canvas.middle)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
-    """Numbers [V] fitted to places, and what is left of the residuals.
-
-    `information` [V, V]: what the places say of the numbers, the inverse of a covariance, if they are
-    independent; as many residuals as there are numbers are fitted by any. `length` is their code length in
-    nats, but for what all fits share; `alike` how much of a residual is its neighbour's.
-    """
-
-    numbers: Tensor
-    information: Tensor
-    length: float
-    alike: float
-
-    def share(self, *, each: float, directions: int) -> float:
-        """How many independent witnesses an object is that stands for `each`, of a pattern in `directions`.
-
-        As in a chain of which each link remembers a share of the one before.
-        """
-        alike = self.alike ** (each ** (-1 / directions))
-        return each * ((1 - alike) / (1 + alike)) ** directions
-
-    def covariance(self, share: float, known: Tensor) -> Tensor:
-        """The numbers' covariance [V, V]; `known` [V] is what else is known of each, as 1 / variance."""
-        return inverse(share * self.information + torch.diag(known))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -219,14 +175,13 @@ def objects_of(
     closer = find_about(evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE)
     offsets = torch.where((closer.lead > 0)[:, None], closer.offsets, 0.0)
     places, _ = project(matrix, about.points(offsets[:, None])[:, 0])
-    certainty = certainty.double()
     return Objects(
         filling,
         numbers,
         index[there],
         places if seen is None else seen.points_on_photo(places),
         whitening(matrix, where),
-        certainty / certainty.mean(),
+        certainty.double(),
         shown / len(index),
         len(half_steps(pattern)),
         focal_mm,
@@ -260,49 +215,6 @@ def settled(objects: Objects, *free: Free) -> Settled:
     return Settled(objects, free, fit)
 
 
-def fitted(
-    points_of: Callable[[Tensor], Tensor],
-    start: Tensor,
-    *,
-    places: Tensor,
-    whiten: Tensor,
-    weights: Tensor,
-    limits: Tensor,
-    mean: Tensor,
-    known: Tensor,
-) -> Fitted:
-    """Numbers moved from `start` [V] until points fall on their places [N, 2].
-
-    Gauss-Newton; the scale of the noise, and with it how much strays count, is fitted along. `points_of`
-    takes numbers [..., V] to points [..., N, 2]; `whiten` [N, 2, 2] and `limits` [V] as in
-    `fit/robust.robust_fit`; `weights` [N] have the mean 1; `mean` and `known` [V] are what is known
-    beforehand, and as 1 / variance.
-    """
-    numbers, variance, steps = start, _VARIANCE, 0
-    while True:
-        points, slopes = with_slopes(points_of, numbers, limits)
-        residual = torch.einsum("nij,nj->ni", whiten, points - places)
-        rows = torch.einsum("nij,njp->nip", whiten, slopes) / limits
-        robust, variance = _weighed(residual, weights, variance)
-        information = torch.einsum("nip,n,niq->pq", rows, robust / variance, rows)
-        slope = torch.einsum("nip,n,ni->p", rows, robust / variance, residual) + known * (numbers - mean)
-        step = -inverse(information + torch.diag(known)) @ slope / limits
-        worst = float(step.abs().max())
-        if steps == _MOST_STEPS or not math.isfinite(worst) or worst < _SETTLED:
-            break
-        numbers = numbers + step * limits / max(1.0, worst)
-        steps += 1
-    squared = residual.square().sum(1)
-    each = math.log(variance) + (_TAIL + 2) / 2 * (1 + squared / (_TAIL * variance)).log()
-    spare = max(1 - len(numbers) / (2 * len(places)), 0.0)
-    return Fitted(
-        numbers,
-        spare * (_TAIL + 2) / (_TAIL + 4) * information,
-        float((weights * each).sum()),
-        _alike(points, residual * robust.sqrt()[:, None]),
-    )
-
-
 def saved_bits(less: Settled, more: Settled, *, share: float) -> float:
     """How much shorter the places are told with the numbers that `more` has beside those of `less`.
 
@@ -311,29 +223,3 @@ def saved_bits(less: Settled, more: Settled, *, share: float) -> float:
     """
     spare = max(1 - len(more.fit.numbers) / (2 * len(more.objects.index)), 0.0)
     return spare * share * (less.fit.length - more.fit.length) / math.log(2)
-
-
-def _weighed(residual: Tensor, certainty: Tensor, variance: float) -> tuple[Tensor, float]:
-    """What objects [N] count whose residuals are [N, 2], and the variance of these: a few steps of EM."""
-    squared = residual.square().sum(1)
-    weights = certainty
-    for _ in range(_SCALINGS):
-        weights = certainty * (_TAIL + 2) / (_TAIL + squared / variance)
-        variance = max(float((weights * squared).sum()) / (2 * len(squared)), _LEAST_VARIANCE)
-    return weights, variance
-
-
-def _alike(points: Tensor, left: Tensor) -> float:
-    """How much residuals `left` [N, 2] are those of their neighbours, 0 to _MOST_ALIKE."""
-    apart = torch.cdist(points, points).fill_diagonal_(torch.inf)
-    shared = float((left * left[apart.argmin(1)]).sum() / left.square().sum().clamp(min=1e-12))
-    # By chance they share 0, give or take the root of 1 / N; less than that is nothing.
-    chance = 1 / math.sqrt(len(points))
-    return 0.0 if shared <= chance else min(shared * (1 - (chance / shared) ** 2), _MOST_ALIKE)
-
-
-def inverse(matrix: Tensor) -> Tensor:
-    """The inverse of a matrix of information, whose empty directions stay as good as unknown."""
-    scale = matrix.diagonal().clamp(min=1e-12).rsqrt()
-    even = matrix * scale[:, None] * scale + 1e-9 * torch.eye(len(matrix), dtype=matrix.dtype)
-    return torch.linalg.inv(even) * scale[:, None] * scale

@@ -62,11 +62,3 @@ def with_printed_scores(
         return score_of_program(evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1)
 
     return [replace(one, score=printed(one)) if suffices(one, needed) else one for one in answers]
-
-
-def faint_note(answer: Answer, objects: int) -> str:
-    """What to say of an answer whose score alone would not do."""
-    return (
-        f"each of the {objects} objects agrees a little only (agreement {answer.score:.2f}); "
-        f"together they explain {answer.worth:.0f} bits, which noise would hardly ever show"
-    )

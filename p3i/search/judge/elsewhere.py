@@ -5,14 +5,12 @@ are told beside it. They come nearly for free: fits that grew elsewhere while th
 """
 
 import dataclasses
-import math
 from collections.abc import Callable
 
 import cv2
 import numpy as np
 import torch
 
-from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
 from p3i.search.fit.fitted import Fit
 from p3i.search.judge.accept import beyond_noise
@@ -21,9 +19,6 @@ from p3i.search.look.cells import sample_points
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import Other
-
-# Planes whose normals differ by more than this are two.
-_OTHER_PLANE_DEG = 8.0
 
 Finish = Callable[[Session, Fit], Answer | None]
 
@@ -61,14 +56,7 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     if not others:
         return answers
     told = tuple(_told(evidence, other) for other in others)
-    notes = (*first.notes, _note(told, turned=_turned(first, others[0])))
-    return [dataclasses.replace(first, notes=notes, others=told), *answers[1:]]
-
-
-def _turned(one: Answer, other: Answer) -> bool:
-    """Whether the planes of two answers are turned against each other."""
-    cosine = sum(a * b for a, b in zip(*(Camera.of(it.program).normal for it in (one, other)), strict=True))
-    return math.degrees(math.acos(max(-1.0, min(1.0, cosine)))) > _OTHER_PLANE_DEG
+    return [dataclasses.replace(first, notes=(*first.notes, _note(told)), others=told), *answers[1:]]
 
 
 def _told(evidence: Evidence, answer: Answer) -> Other:
@@ -87,13 +75,12 @@ def _told(evidence: Evidence, answer: Answer) -> Other:
     )
 
 
-def _note(others: tuple[Other, ...], *, turned: bool) -> str:
-    """The sentence that tells of others; `turned`: the first of them lies on another plane."""
+def _note(others: tuple[Other, ...]) -> str:
+    """The sentence that tells of others."""
     where = ", ".join(f"({x:.0f}, {y:.0f})" for x, y in (other.center for other in others))
     if len(others) > 1:
         return f"{len(others)} other patterns lie around {where}: synth --all gives each its program"
-    what = "another plane carries a pattern," if turned else "another pattern lies"
-    return f"{what} around {where}: synth --all gives it a program too"
+    return f"another pattern lies around {where}: synth --all gives it a program too"
 
 
 def _polygon(evidence: Evidence, answer: Answer) -> np.ndarray:

@@ -237,10 +237,7 @@ def find_about(
 
 def whitening(matrix: Tensor, where: Frames) -> Tensor:
     """[N, 2, 2]: differences in pixels to differences in units of places' noise, along and across."""
-    px_from_side = _px_from_side(matrix, where)
-    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
-    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
-    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
+    return in_units_of_noise(_px_from_side(matrix, where))
 
 
 def areas_px(matrix: Tensor, where: Frames) -> Tensor:
@@ -256,6 +253,13 @@ def _px_from_side(matrix: Tensor, where: Frames) -> Tensor:
         behind, _ = project(matrix, where.origin - 0.1 * axis)
         columns.append((ahead - behind) / 0.2)
     return torch.stack(columns, 2)
+
+
+def in_units_of_noise(px_from_side: Tensor) -> Tensor:
+    """What takes pixels to sides of patches or cells, [N, 2, 2], the other way, in units of places' noise."""
+    side_px = torch.linalg.det(px_from_side).abs().sqrt().clamp(min=1.0)
+    noise = (_SHARE_NOISE**2 + (_PIXEL_NOISE / side_px) ** 2).sqrt()
+    return torch.linalg.pinv(px_from_side) / noise[:, None, None]
 
 
 def misfit(difference: Tensor, *, whiten: Tensor, certainty: Tensor) -> float:

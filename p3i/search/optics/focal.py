@@ -29,6 +29,7 @@ from p3i.interp.pattern import Pattern
 from p3i.interp.unroll import nest
 from p3i.search.answer import Answer
 from p3i.search.fit.judged import MOST_JUDGED
+from p3i.search.fit.robust import inverse
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.lattice import in_shortest_steps
 from p3i.search.look.patches import frames, spacing, whitening
@@ -295,9 +296,4 @@ def _covariance(pattern: Pattern, *, size: Size, focal_mm: float) -> Tensor | No
     matrix = pattern.image_from_plane(theta, size=size, focal_mm=focal_mm)
     whiten = whitening(matrix, frames(pattern, theta, index, side=spacing(pattern, theta)))
     rows = (whiten @ torch.func.jacfwd(pixels)(theta)).reshape(-1, len(theta))
-    normal = rows.T @ rows
-    scale = normal.diagonal().clamp(min=1e-12).rsqrt()
-    even = normal * scale[:, None] * scale
-    if float(torch.linalg.eigvalsh(even)[0]) < 1e-10:
-        return None
-    return torch.linalg.inv(even) * scale[:, None] * scale
+    return inverse(rows.T @ rows)

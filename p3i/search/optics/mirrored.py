@@ -3,42 +3,28 @@
 Seen from far away, a circle and everything on it look the same whether the plane leans to one side or to the
 other: only perspective, by which near objects are larger and further apart, tells which (the two planes that
 cut a cone in circles; Forsyth et al., Invariant descriptors for 3-D object recognition and pose, PAMI 1991).
-Whether the objects of an answer tell is asked of the answer itself: its mirror image is fitted to them too.
+Whether the objects of an answer tell is asked of the answer itself: its mirror image is fitted to their
+places too, and must lie farther from them than the noise of places allows.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from p3i.grammar.leaves import leaves
 from p3i.interp.camera import Camera
 from p3i.search.answer import Answer
-from p3i.search.fit.fitted import Fit
-from p3i.search.fit.places import measured, numbers_of, registered, values_of
-from p3i.search.forms.filling import Filling
-from p3i.search.forms.whole import whole_filling
+from p3i.search.fit.robust import fitted, moving_limits
+from p3i.search.fit.settle import Objects, Settled, objects_of, settled
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.patches import misfit
 from p3i.search.optics.tilt import TOLD_DEG
-from p3i.size import Size
+from p3i.search.result import NEEDED_BITS
 
-Array = NDArray[np.float64]
-
-# The objects tell the poses apart where the misfit is so much larger: by its logarithm, times the objects (an
-# F-test), and as a logarithm of likelihoods under the noise that places have.
-_TELLS = 6.0
-_LEAST_MISFIT, _WORST_MISFIT = 0.01, 5.0
-_ROUNDS = 2
-
-
-@dataclass(frozen=True, slots=True)
-class _Turned:
-    """A similarity of the plane: complex numbers, p -> factor * p + shift with p = x + y*1j."""
-
-    factor: complex
-    shift: complex
+# Planes are not seen more steeply than this.
+_STEEPEST_DEG = 80.0
 
 
 def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
@@ -49,24 +35,20 @@ def mirrored_camera(evidence: Evidence, answer: Answer) -> Camera | None:
     values = leaves(answer.program)
     if values.get("draw.x.angle.j", 0.0) == 0.0 or "draw.y.angle.j" not in values:
         return None
-    filling, as_written = whole_filling(answer.program)
-    focal_mm = answer.focal_mm or evidence.focal_mm
-    camera = Camera.of(answer.program, focal_mm=focal_mm)
-    own = _fit(evidence, filling, as_written, focal_mm)
-    if own is None:
+    objects = objects_of(evidence, answer.program, focal_mm=answer.focal_mm)
+    if objects is None:
         return None
-    start = _mirror_image(own, camera, evidence.image.size)
-    other = None if start is None else _fit(evidence, filling, start, focal_mm)
+    own = settled(objects)
+    camera = Camera.of(own.program(), focal_mm=objects.focal_mm)
+    other = _mirrored(objects, camera)
     if other is None:
         return None
-    values = values_of(other)
-    found = Camera(values["camera.rx"], values["camera.ry"], focal_mm)
+    found = Camera.of(other.program(), focal_mm=objects.focal_mm)
     apart = math.degrees(math.acos(min(1.0, abs(float(np.dot(found.normal, camera.normal))))))
-    ours, theirs = (min(fit.cost, _WORST_MISFIT) + _LEAST_MISFIT for fit in (own, other))
-    told = len(own.contrast) * min(math.log(theirs / ours), 2 * (theirs - ours))
-    if apart < TOLD_DEG or told > _TELLS:
-        return None
-    return found
+    # Under the noise that places have on photos, however small it is here (`patches.misfit` is half of it).
+    ours, theirs = (_misfit(one) for one in (own, other))
+    told_bits = own.share * len(objects.index) * 2 * (theirs - ours) / math.log(2)
+    return None if apart < TOLD_DEG or told_bits > NEEDED_BITS else found
 
 
 def ambiguity_note(camera: Camera) -> str:
@@ -77,52 +59,32 @@ def ambiguity_note(camera: Camera) -> str:
     )
 
 
-def _fit(evidence: Evidence, filling: Filling, z: torch.Tensor, focal_mm: float) -> Fit | None:
-    """A few rounds of registration: the last, since where misfits are compared all have gone as far."""
-    fit = measured(evidence, filling, z, focal_mm=focal_mm)
-    for _ in range(_ROUNDS):
-        fit = None if fit is None else registered(evidence, fit, keep_side=True)
-    return fit
-
-
-def _mirror_image(fit: Fit, camera: Camera, size: Size) -> torch.Tensor | None:
-    """The numbers [F] of the program that draws the same places, about, from the mirrored pose."""
-    pattern = fit.filling.pattern
-    plane = pattern.points_at(fit.index, fit.theta).numpy()
-    seen = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm).numpy()
-    photo = _projected(seen, plane)
-    middle = photo.mean(0)
-    sight = np.array([*(middle - size.middle), camera.focal_px(size)])
+def _mirrored(objects: Objects, camera: Camera) -> Settled | None:
+    """The program fitted to its objects from the pose mirrored at the line of sight to their middle."""
+    size = objects.canvas
+    sight = np.array([*(objects.places.numpy().mean(0) - size.middle), camera.focal_px(size)])
     sight /= np.linalg.norm(sight)
     normal = np.array(camera.normal)
     x, y, z = (2 * float(normal @ sight) * sight - normal).tolist()
-    mirrored = Camera.from_normal((x, y, z), focal_mm=fit.focal_mm)
-    if abs(mirrored.rx_deg) > 80 or abs(mirrored.ry_deg) > 80:
+    mirrored = Camera.from_normal((x, y, z), focal_mm=objects.focal_mm)
+    if max(abs(mirrored.rx_deg), abs(mirrored.ry_deg)) > _STEEPEST_DEG:
         return None
-    plane_from_image = np.linalg.inv(mirrored.image_from_plane(size).numpy())
-    turned = _similarity(plane, _projected(plane_from_image, photo))
-    values = values_of(fit)
-    values |= {"camera.rx": mirrored.rx_deg, "camera.ry": mirrored.ry_deg}
-    for variable in ("1", "i", "j"):
-        radius, x, y = (f"draw.{name}.{variable}" for name in ("x.radius", "x.offset", "y.offset"))
-        if radius in values:
-            values[radius] *= abs(turned.factor)
-        if x in values and y in values:
-            moved = turned.factor * complex(values[x], values[y]) + turned.shift * (variable == "1")
-            values |= {x: moved.real, y: moved.imag}
-    values["draw.x.angle.1"] += math.degrees(math.atan2(turned.factor.imag, turned.factor.real))
-    return numbers_of(fit.filling, values)
+    start = objects.numbers.clone()
+    start[:2] = torch.tensor([mirrored.rx_deg, mirrored.ry_deg])
+    # First the ring moves onto its objects under that camera, then all numbers do.
+    limits = moving_limits(objects.filling, start)
+    limits[:2] = 0.0
+    moved = fitted(
+        objects.seen,
+        start,
+        places=objects.places,
+        whiten=objects.whiten,
+        weights=objects.weights,
+        limits=limits,
+    )
+    return settled(replace(objects, numbers=moved.numbers))
 
 
-def _projected(matrix: Array, points: Array) -> Array:
-    """Points [N, 2] under a homography [3, 3]."""
-    at = np.concatenate([points, np.ones((len(points), 1))], 1) @ matrix.T
-    return at[:, :2] / at[:, 2:]
-
-
-def _similarity(points: Array, onto: Array) -> _Turned:
-    """The similarity that takes points [N, 2] onto others best, in least squares."""
-    a, b = points @ [1, 1j], onto @ [1, 1j]
-    centred = a - a.mean()
-    factor = complex(np.vdot(centred, b - b.mean()) / max(float(np.vdot(centred, centred).real), 1e-12))
-    return _Turned(factor, complex(b.mean() - factor * a.mean()))
+def _misfit(fit: Settled) -> float:
+    there = fit.objects
+    return misfit(fit.places() - there.places, whiten=there.whiten, certainty=there.weights)

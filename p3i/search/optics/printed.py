@@ -16,7 +16,7 @@ from torch import Tensor
 from p3i.grammar.leaves import with_leaves
 from p3i.interp.camera import project
 from p3i.search.answer import Answer
-from p3i.search.fit.settle import inverse
+from p3i.search.fit.robust import inverse
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.forms.filling import ANGLE_DIGITS, LENGTH_DIGITS
 from p3i.search.forms.whole import whole_filling
@@ -27,7 +27,7 @@ MOST_PX = 0.05
 
 
 def briefly(evidence: Evidence, answer: Answer) -> Answer:
-    """The answer with its numbers written as precisely as a photo can tell, and no more; what is 0 stays 0."""
+    """The answer with its numbers written as precisely as a photo can tell; what is 0 stays 0."""
     filling, numbers = whole_filling(answer.program)
     pattern, size, focal_mm = filling.pattern, evidence.image.size, answer.focal_mm or evidence.focal_mm
     index = pattern.index[evidence.in_sight(pattern, filling.theta(numbers), focal_mm=focal_mm)].double()
@@ -49,7 +49,7 @@ def briefly(evidence: Evidence, answer: Answer) -> Answer:
 def rounded(numbers: Tensor, slopes: Tensor, *, digits: list[int]) -> Tensor:
     """The numbers z [V] with as few decimals as MOST_PX allows, at most `digits` [V] of them.
 
-    `slopes` [N, 2, V] say how the points that must stay move with the numbers, 0 for a number that is to stay.
+    `slopes` [N, 2, V] say how the points that must stay move with the numbers, 0 for one that is kept.
     """
     found, spread = numbers, inverse(torch.einsum("nip,niq->pq", slopes, slopes))
     moving = [k for k in range(len(numbers)) if bool(slopes[..., k].any())]

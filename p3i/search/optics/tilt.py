@@ -14,7 +14,8 @@ import torch
 from torch import Tensor
 
 from p3i.search.answer import Answer
-from p3i.search.fit.settle import Fitted, objects_of, settled
+from p3i.search.fit.robust import Fitted
+from p3i.search.fit.settle import objects_of, settled
 from p3i.search.judge.evaluate import without_lens
 from p3i.search.look.evidence import Evidence
 

@@ -14,7 +14,8 @@ from truth import (
     turned,
 )
 
-from p3i.search.fit.features import refine, step_limits
+from p3i.search.fit.features import refine
+from p3i.search.fit.robust import step_limits
 from p3i.search.forms.lattice import PHASE, Lattice, cell_px
 
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from p3i.search.fit.robust import robust_fit
+from p3i.search.fit.robust import fitted
 from p3i.search.fit.slopes import with_slopes
 
 START = torch.tensor([0.0, 0.0, 7.0], dtype=torch.float64)
@@ -26,7 +26,7 @@ def test_a_number_that_is_held_has_no_slope() -> None:
 
 def test_a_number_that_is_held_stays_and_holds_no_other() -> None:
     whiten = torch.eye(2, dtype=torch.float64).expand(3, 2, 2)
-    fitted = robust_fit(
-        shifted, START, targets=TARGETS, whiten=whiten, weights=torch.ones(3).double(), limits=LIMITS
+    found = fitted(
+        shifted, START, places=TARGETS, whiten=whiten, weights=torch.ones(3).double(), limits=LIMITS
     )
-    assert fitted.tolist() == pytest.approx([3.0, 4.0, 7.0], abs=1e-3)
+    assert found.numbers.tolist() == pytest.approx([3.0, 4.0, 7.0], abs=1e-3)

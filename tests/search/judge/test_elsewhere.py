@@ -43,7 +43,7 @@ def test_another_plane_is_told_of_with_its_place() -> None:
     of_left = pose_error_deg(result.program, small_scene(LEFT).program)
     of_right = pose_error_deg(result.program, small_scene(RIGHT).program)
     assert min(of_left, of_right) < 3
-    said = re.compile(r"another plane carries a pattern, around \((\d+), (\d+)\): .+")
+    said = re.compile(r"another pattern lies around \((\d+), (\d+)\): .+")
     told = [said.fullmatch(note) for note in result.notes]
     place = next((match for match in told if match), None)
     assert place is not None, result.notes
@@ -53,7 +53,7 @@ def test_another_plane_is_told_of_with_its_place() -> None:
 
 
 def place_told(notes: tuple[str, ...]) -> tuple[float, float]:
-    said = re.compile(r"another plane carries a pattern, around \((-?\d+), (-?\d+)\): .+")
+    said = re.compile(r"another pattern lies around \((-?\d+), (-?\d+)\): .+")
     (told,) = [match for note in notes if (match := said.fullmatch(note))]
     return float(told[1]), float(told[2])
 
@@ -75,7 +75,7 @@ def test_under_a_lens_the_other_plane_is_where_the_photo_as_it_is_shows_it() -> 
 def test_a_plane_whose_cells_reach_into_the_answers_region_is_told_of_too() -> None:
     image = beside(lattice_scene(35).pixels, lattice_scene(59).pixels)
     result = synthesize(image, SearchConfig(structure="lattice"))
-    assert any("another plane carries a pattern" in note for note in result.notes), result.notes
+    assert any("another pattern lies around" in note for note in result.notes), result.notes
 
 
 def test_of_a_single_pattern_nothing_is_told() -> None:

@@ -16,7 +16,7 @@ from p3i.interp.camera import Camera, project
 from p3i.interp.lens import straight_from_photo
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
-from p3i.search.fit.settle import fitted
+from p3i.search.fit.robust import fitted
 from p3i.search.look.evidence import Evidence
 from p3i.search.optics.tilt import covariance_of, doubt_note, pose_sigma_deg, sigma_of_normal_deg
 from p3i.search.result import StructureFound
@@ -134,8 +134,6 @@ def _row(noise: Tensor, **changes: float) -> float:
         whiten=torch.eye(2, dtype=torch.float64).expand(400, 2, 2),
         weights=torch.ones(400, dtype=torch.float64),
         limits=torch.ones(2, dtype=torch.float64),
-        mean=start,
-        known=start,
     )
     known = torch.full((2,), changes.get("known", 0.0), dtype=torch.float64)
     share = fit.share(each=changes.get("each", 1.0), directions=1)
