@@ -9,14 +9,12 @@ import torch
 from torch import Tensor
 
 from p3i.interp.pattern import Pattern
-from p3i.search.fit.robust import step_limits
+from p3i.search.fit.robust import SETTLED, step_limits
 from p3i.search.fit.slopes import with_slopes
 from p3i.search.look.cells import sample_grid, sample_points
 from p3i.search.look.evidence import Level
 from p3i.vision.warp import sample, sample_valid
 
-# A step this small against those limits ends the refinement.
-_CONVERGED = 2e-3
 # Levenberg damping, relative to the diagonal.
 _DAMPING = 1e-3
 # Residuals beyond so many times what is typical of them count less and less (a Cauchy weight).
@@ -62,7 +60,7 @@ def refine(
             break
         worst = float(step.abs().max())
         theta = theta + step * limits / max(1.0, worst)
-        if worst < _CONVERGED:
+        if worst < SETTLED:
             break
     return theta
 

@@ -31,7 +31,7 @@ _TAIL = 4.0
 # fiftieth of a pixel; interpolation between pixels is no better.
 _VARIANCE, _LEAST_VARIANCE = 0.25, 0.0044
 _MOST_STEPS, _SCALINGS = 20, 5
-_SETTLED = 1e-3
+SETTLED = 1e-3
 _MOST_ALIKE = 0.6
 
 
@@ -92,7 +92,7 @@ def fitted(
         slope = slope + known * (numbers - mean) * limits
         step = -inverse(information + torch.diag(known * limits**2)) @ slope
         worst = float(step.abs().max())
-        if steps == _MOST_STEPS or not math.isfinite(worst) or worst < _SETTLED:
+        if steps == _MOST_STEPS or not math.isfinite(worst) or worst < SETTLED:
             break
         numbers = numbers + step * limits / max(1.0, worst)
         steps += 1

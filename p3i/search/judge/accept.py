@@ -14,8 +14,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.judge.evaluate import score_of_program
+from p3i.search.look.contrast import FEW
 from p3i.search.look.evidence import Evidence
 from p3i.search.result import NEEDED_BITS
 
@@ -44,8 +46,17 @@ def beyond_noise(bits: float) -> bool:
 def suffices(answer: Answer, needed: float | None) -> bool:
     """Whether it is an answer: beyond noise by its `worth` in bits, or, where a person asked, by the score
     `needed`.
+
+    Where the cells of a lattice are as much alike half a step away, the bits do not tell of its steps.
     """
-    return beyond_noise(answer.worth) if needed is None else answer.score >= needed
+    if needed is not None:
+        return answer.score >= needed
+    return beyond_noise(answer.worth) and not _as_much_at_half_steps(answer)
+
+
+def _as_much_at_half_steps(answer: Answer) -> bool:
+    """Whether a lattice agrees no more than half a step away, by a score that is told of more than a few."""
+    return answer.structure == "lattice" and answer.score <= 0 and len(compile(answer.program).index) > FEW
 
 
 def with_printed_scores(
@@ -61,4 +72,7 @@ def with_printed_scores(
     def printed(answer: Answer) -> float:
         return score_of_program(evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1)
 
-    return [replace(one, score=printed(one)) if suffices(one, needed) else one for one in answers]
+    def worth_a_look(answer: Answer) -> bool:
+        return beyond_noise(answer.worth) if needed is None else answer.score >= needed
+
+    return [replace(one, score=printed(one)) if worth_a_look(one) else one for one in answers]

@@ -47,7 +47,9 @@ def explained(evidence: Evidence, answer: Answer) -> Answer:
     if pattern.turning is not None:
         pattern, bits = as_it_stands(evidence, pattern, index, focal_mm=focal_mm)
     else:
-        bits = recurrence_bits(evidence, pattern, index, focal_mm=focal_mm, cells=cells)
+        bits = recurrence_bits(
+            evidence, pattern, index, focal_mm=focal_mm, cells=cells, needed=cost + NEEDED_BITS
+        )
     return replace(answer, worth=bits - cost, upright=pattern.upright)
 
 

@@ -4,8 +4,8 @@ import math
 
 import torch
 
-# What so many cells explain, chance explains too; on a curve fewer, as there are fewer curves to choose from.
-_FEW = 6
+FEW = 6
+"""What so many cells explain, chance explains too; on a curve fewer, as there are fewer curves."""
 _FEW_ON_CURVE = 3
 # So much agreement is found on some curve of every photo.
 _CHANCE_OF_CURVE = 0.1
@@ -18,7 +18,7 @@ def score_of(contrast: torch.Tensor) -> float:
 
     Few cells agree by chance, and eight numbers are fitted to them.
     """
-    return max(0.0, mean_contrast(contrast) * (1 - _FEW / max(len(contrast), _FEW)))
+    return max(0.0, mean_contrast(contrast) * (1 - FEW / max(len(contrast), FEW)))
 
 
 def score_of_curve(quality: float, count: int) -> float:

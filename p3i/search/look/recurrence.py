@@ -28,6 +28,7 @@ from p3i.interp.camera import project
 from p3i.interp.pattern import Pattern
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import quarter_turned, tangents
+from p3i.search.look.sampling import on_own_grid
 from p3i.search.look.thinned import thinned
 from p3i.search.look.unrolled import orientation
 from p3i.vision.warp import sample, sample_valid
@@ -75,28 +76,44 @@ def recurrence_bits(
     focal_mm: float,
     cells: bool,
     theta: Tensor | None = None,
+    needed: float = 0.0,
 ) -> float:
     """What the draws at `index` [N, 2] save by coming again at the program's steps, in bits, at least 0.
 
     `cells`: the draws are rows of rows, all of which are alike, and must come again along i and along j: the
-    fewer bits count. Else each value of the loop variable that does not go along the curve has a ring, or
-    row, of its own, and the bits of all add up. `theta` [P] are other numbers than the program's. That
-    objects on a curve stand upright has to be told: it costs UPRIGHT_BITS.
+    fewer bits count, and where they lie on the picture's own grid (sampling.py) their colours alone. Else
+    each value of the loop variable that does not go along the curve has a ring, or row, of its own, and the
+    bits of all add up. `theta` [P] are other numbers than the program's. That objects on a curve stand
+    upright has to be told: it costs UPRIGHT_BITS.
+
+    Of many draws a part is read, and the others are taken to save as much each. By chance a few bits would
+    become many so; they count for all only where those that were read save more than `needed`.
     """
     theta = pattern.theta if theta is None else theta
     every, index = len(index), index[thinned(index, _MOST_READ)]
     each = every / max(len(index), 1)
 
+    edges = True
+    if cells:
+        matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+        points, _ = project(matrix, pattern.points_at(index, theta))
+        edges = not on_own_grid(evidence.on_photo(points), index)
+
     def read(part: Tensor, along: int) -> Sectors:
-        return sectors_of(evidence, pattern, part, theta, focal_mm=focal_mm, along=along, cells=cells)
+        return sectors_of(
+            evidence, pattern, part, theta, focal_mm=focal_mm, along=along, cells=cells, edges=edges
+        )
+
+    def of_all(bits: float) -> float:
+        return each * bits if bits > needed else bits
 
     if cells:
-        return each * min(_bits(read(index, along)) for along in (0, 1))
+        return of_all(min(_bits(read(index, along)) for along in (0, 1)))
     along = 1 if pattern.turning is None else pattern.turning
     ring = index[:, 1 - along]
     rings = [read(index[ring == one], along) for one in ring.unique()]
     plainest = max((one.energy for one in rings), default=0.0)
-    saved = each * sum(_bits(one) for one in rings if one.energy >= _FAINT * plainest)
+    saved = of_all(sum(_bits(one) for one in rings if one.energy >= _FAINT * plainest))
     return max(saved - UPRIGHT_BITS * pattern.upright, 0.0)
 
 
@@ -151,9 +168,10 @@ def sectors_of(
     focal_mm: float,
     along: int,
     cells: bool,
+    edges: bool = True,
 ) -> Sectors:
     """The sectors about the draws at `index` [N, 2], read along the loop variable `along`, 0 for i or 1 for
-    j.
+    j; their colours alone, or their `edges` too.
     """
     # Half a step more at either end, for the mean over one step, and a sample for the gradients.
     a = (np.arange(2 * ALONG + 2) + 0.5) / ALONG - 1 - 1 / ALONG
@@ -169,8 +187,8 @@ def sectors_of(
         _without_mean(values, known)
         for values in (np.stack(orientation(gx, gy), 1), np.moveaxis(lab[:, 1:-1, 1:-1], -1, 1))
     )
-    # [N, 6, ACROSS, ALONG], gradients and colours with the same weight.
-    values = np.concatenate([_evened(gradients, seen), _evened(colours, seen)], 1)
+    # [N, 3 or 6, ACROSS, ALONG], gradients and colours with the same weight.
+    values = np.concatenate([_evened(each, seen) for each in ([gradients] * edges + [colours])], 1)
     waves = np.fft.fft(values, axis=-1)[..., 1 : ALONG // 2].astype(np.complex64)
     enough = seen.mean((1, 2)) >= _LEAST_KNOWN
     typical, colour = (

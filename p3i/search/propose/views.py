@@ -34,17 +34,16 @@ class Canvas:
         return np.array([[self.unit, 0, corner[0]], [0, self.unit, corner[1]], [0, 0, 1.0]])
 
 
-def view_canvas(map_from_plane: Array, size: Size, *, side: int, depth_range: float) -> Canvas | None:
+def view_canvas(map_from_plane: Array, size: Size, *, side: int) -> Canvas | None:
     """The canvas of `side` pixels for a map of this size seen under a homography; None where no plane shows.
 
-    `map_from_plane` is [3, 3]. The view reaches to where things are `depth_range` times as far away as the
-    nearest.
+    `map_from_plane` is [3, 3].
     """
     x, y = np.meshgrid(np.linspace(0, size.width - 1, 17), np.linspace(0, size.height - 1, 17))
     plane = np.linalg.inv(map_from_plane) @ np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
     if plane[2].max() <= 0:
         return None
-    near = plane[2] >= plane[2].max() / depth_range  # the third row is 1 / depth
+    near = plane[2] >= plane[2].max() / _DEPTH_RANGE  # the third row is 1 / depth
     points = plane[:2, near] / plane[2, near]
     low, high = points.min(1), points.max(1)
     return Canvas(side, float((high - low).max()) / (side - 1), (low + high) / 2)
@@ -85,7 +84,7 @@ def gradient_view(colours: ColourMap, map_from_plane: Array, *, side: int) -> Gr
     `map_from_plane` is [3, 3].
     """
     height, width = colours.valid.shape
-    canvas = view_canvas(map_from_plane, Size(width, height), side=side, depth_range=_DEPTH_RANGE)
+    canvas = view_canvas(map_from_plane, Size(width, height), side=side)
     if canvas is None:
         return None
     map_from_view = map_from_plane @ canvas.plane_from_view

@@ -6,7 +6,6 @@ autocorrelation in overlapping windows, where perspective is mild; right for sma
 for tilts beyond the grid. A window says nothing of the tilt, so it comes with several.
 """
 
-import cv2
 import numpy as np
 
 from p3i.interp.camera import image_from_plane
@@ -15,15 +14,13 @@ from p3i.search.forms.lattice import Lattice, reduce_basis
 from p3i.search.look.evidence import FINE, Evidence, Level
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.shifts import autocorrelation, best_pair
-from p3i.search.propose.views import depth_of_view, even_weights, view_canvas
+from p3i.search.propose.views import depth_of_view, even_weights, view_canvas, warped
 
 # The canvas of a straightened view, in pixels a side.
 _CANVAS = 128
 # Poses lie about this far apart when seen straight on, closer with tilt, and up to this tilt.
 POSE_STEP_DEG = 11.0
 MOST_TILT_DEG = 66.0
-# A view reaches to where things are this many times as far away as the nearest.
-_DEPTH_RANGE = 3.5
 # The autocorrelation sees this many channels (the strongest), which OpenCV warps in one go.
 _CHANNELS = 4
 # Shortest and longest shift, in pixels of the canvas.
@@ -110,25 +107,16 @@ class _Views:
             level.map_from_photo
             @ image_from_plane(rx_deg, ry_deg, size=level.photo_size, focal_mm=self._focal_mm)
         ).numpy()
-        canvas = view_canvas(map_from_plane, level.size, side=_CANVAS, depth_range=_DEPTH_RANGE)
+        canvas = view_canvas(map_from_plane, level.size, side=_CANVAS)
         if canvas is None:
             return None
         map_from_view = map_from_plane @ canvas.plane_from_view
 
-        def warped(planes: np.ndarray) -> np.ndarray:
-            return cv2.warpPerspective(
-                planes,
-                map_from_view,
-                (_CANVAS, _CANVAS),
-                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-                borderMode=cv2.BORDER_CONSTANT,
-            )
-
         depth = depth_of_view(map_from_view, _CANVAS)
-        known = np.where(depth > 0, warped(self._known), 0)
+        known = np.where(depth > 0, warped(self._known, map_from_view, _CANVAS), 0)
         if not (known > 0.5).any():
             return None
-        features = warped(self._planes)
+        features = warped(self._planes, map_from_view, _CANVAS)
         if features.ndim == 2:
             features = features[:, :, None]
         return features, even_weights(known, depth), canvas.unit, canvas.middle
