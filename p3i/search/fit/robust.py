@@ -90,7 +90,8 @@ def fitted(
         information = torch.einsum("nip,n,niq->pq", rows, robust / variance, rows)
         slope = torch.einsum("nip,n,ni->p", rows, robust / variance, residual)
         slope = slope + known * (numbers - mean) * limits
-        step = -inverse(information + torch.diag(known * limits**2)) @ slope
+        # A direction in which even the longest step moves places by less than their noise is hardly followed.
+        step = -inverse(information + torch.diag(known * limits**2 + 1)) @ slope
         worst = float(step.abs().max())
         if steps == _MOST_STEPS or not math.isfinite(worst) or worst < SETTLED:
             break
