@@ -12,6 +12,7 @@ from ringed import found_on, found_ring, searches_around
 
 from p3i.evaluation.hybrid_scenes import hybrid_scene
 from p3i.evaluation.scene import Scene, on_canvas
+from p3i.evaluation.scenes import scene as drawn_scene
 from p3i.grammar.ast import Affine, Polar
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.camera import Camera
@@ -26,7 +27,7 @@ from p3i.search.judge.answered import _without_empty_middle
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import NEEDED
-from p3i.search.synthesize import searched
+from p3i.search.synthesize import searched, synthesize
 
 SCENES = {"concentric": 12, "fan": 9, "row": 14}
 CONFIG = SearchConfig(structure="hybrid", focal_mm=35.0)
@@ -68,6 +69,18 @@ def test_a_fan_is_found_from_its_inner_ring_though_the_outer_draws_lie_far_apart
     apart = np.linalg.norm(scene.centers_px[:, None] - drawn[seen], axis=2)
     assert seen.sum() == len(scene.centers_px) == 18
     assert apart.min(1).max() < 10
+
+
+def test_rings_of_objects_that_stand_upright_are_found_along_their_line() -> None:
+    """Nuts that do not turn as they go round: their ring is no less sure, and comes again."""
+    found = synthesize(drawn_scene("hybrid", 5043).image(), SearchConfig())
+    assert found.structure == "hybrid" and found.upright
+    assert len(found.centers) == 33
+
+
+def test_a_ring_with_two_objects_hidden_still_comes_again() -> None:
+    found = synthesize(drawn_scene("hybrid", 5046).image(), SearchConfig())
+    assert found.structure == "hybrid" and len(found.centers) == 33
 
 
 def rings_with(*contrasts: list[float]) -> Fit:

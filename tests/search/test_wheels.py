@@ -10,8 +10,10 @@ import p3i
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
 from p3i.search.config import SearchConfig
+from p3i.search.look.evidence import Evidence
+from p3i.search.look.session import Session
 from p3i.search.result import SynthesisResult
-from p3i.search.synthesize import synthesize
+from p3i.search.synthesize import searched, synthesize
 from p3i.size import Size
 
 WHEEL = DrawnRing(
@@ -40,6 +42,13 @@ def test_the_gondolas_of_a_wheel_are_found_where_they_hang() -> None:
     assert len(points(result.program)) == WHEEL.count
     assert tilt_error_deg(result.program, WHEEL.rx_deg, WHEEL.ry_deg) < 1.5
     assert away_px(result, WHEEL) < 0.5 * WHEEL.size * WHEEL.canvas.unit_px
+
+
+def test_a_ring_of_upright_objects_is_as_sure_as_it_is_plain() -> None:
+    """Moved to its objects' middles it kept no misfit of its places, which counted as the worst."""
+    look = Session(Evidence(WHEEL.image(), SearchConfig(structure="circular"), 35.0), SearchConfig())
+    surest = max(drawn.sure for drawn in searched(look).rings())
+    assert surest > 0.5
 
 
 def test_a_wheel_says_in_its_header_that_its_objects_hang_and_none_is_absent() -> None:

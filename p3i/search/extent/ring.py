@@ -1,6 +1,7 @@
 """From a ring that was fitted to a program: where on it the objects are."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,8 +26,8 @@ def drawn_ring(look: Session, fit: Fit) -> Drawn:
     found, most = fit, -math.inf
     for place in places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]:
         moved = _moved(look, fit, place)
-        if moved is not None and (bits := saved_bits(look.evidence, moved)) > most:
-            found, most = moved, bits
+        if moved is not None and (told := saved_bits(look.evidence, moved) * moved.quality) > most:
+            found, most = moved, told
     return Drawn(found.program(), found, curve_score(found))
 
 
@@ -42,7 +43,8 @@ def _upright(evidence: Evidence, fit: Fit) -> Fit:
         z = numbers_of(fit.filling, values | {"draw.x.offset.1": x, "draw.y.offset.1": y})
         moved = measured(evidence, fit.filling, z, focal_mm=fit.focal_mm, side=fit.side)
         found += [] if moved is None else [moved]
-    return centred(evidence, max(found, key=lambda one: standing_out(evidence, one)))
+    moved = centred(evidence, max(found, key=lambda one: standing_out(evidence, one)))
+    return replace(moved, cost=fit.cost, bits=fit.bits)  # all objects moved alike
 
 
 def _moved(look: Session, fit: Fit, place: Place) -> Fit | None:

@@ -11,8 +11,8 @@ from p3i.search.look.session import Session
 
 # Objects with less than this share of the plain ones' contrast are not there.
 _PRESENT = 0.4
-# A ring is closed where at most this share of it lacks in one piece.
-_MOST_LACKING = 0.2
+MOST_LACKING = 0.2
+"""A ring is closed where at most this share of it lacks in one piece."""
 # Growth looks this many places beyond an arc's ends.
 _REACH = 3
 
@@ -25,7 +25,7 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
     """
     count = len(fit.pattern.index)
     first, length = _best_run(fit)
-    if length >= (1 - _MOST_LACKING) * count:
+    if length >= (1 - MOST_LACKING) * count:
         return fit
 
     def of(slots: int, *, drawn: int | None = None) -> Filling:

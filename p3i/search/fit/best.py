@@ -48,9 +48,10 @@ class Best:
         )
 
     def rings(self) -> list[Drawn]:
-        """The rings that were found, the surest first."""
-        rings = [one.drawn for one in self.found if one.sketch.shape == "ring"]
-        return sorted(rings, key=lambda drawn: -drawn.sure)
+        """The rings beyond noise, and those that strict has no words for, the surest first."""
+        rings = [one for one in self.found if one.sketch.shape == "ring"]
+        beyond = [one for one in rings if all(answer.worth > NEEDED_BITS for answer in one.answers)]
+        return sorted((one.drawn for one in beyond), key=lambda drawn: -drawn.sure)
 
     def holds_closed_ring(self) -> bool:
         """Whether a ring beyond noise was found that goes all the way round, its step a part of a turn."""

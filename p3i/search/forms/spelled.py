@@ -9,7 +9,7 @@ from functools import cache
 
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.sketch import Sketch, parse_sketch
-from p3i.search.forms.filling import Filling, only_filling
+from p3i.search.forms.filling import Filling, only_filling, standing
 
 LATTICE = "Draw(x=??*i + ??*j + ??, y=??*i + ??*j + ??)"
 
@@ -63,7 +63,8 @@ def rings_filling(
 def with_rings(filling: Filling, *, first: int, stop: int) -> Filling:
     """The same sketch with rings from `first` until before `stop`."""
     rings = {"for_i.start.1": first, "for_i.stop.1": stop}
-    return only_filling(replace(filling.sketch, template=with_leaves(filling.sketch.template, rings)))
+    more = only_filling(replace(filling.sketch, template=with_leaves(filling.sketch.template, rings)))
+    return standing(more, upright=filling.pattern.upright)
 
 
 def rings_of(filling: Filling) -> tuple[int, int]:

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import project
 from p3i.search.config import FEWEST_OBJECTS
+from p3i.search.fit.arc import MOST_LACKING
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import numbers_of, values_of
+from p3i.search.forms.filling import standing
 from p3i.search.forms.guess import Base, Guess
 from p3i.search.forms.spelled import rings_filling
 from p3i.search.look.cells import Cells, agreement, mean_cell
@@ -30,10 +32,6 @@ from p3i.search.propose.views import gradient_view
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
 
-# A ring that goes round this far is taken for a whole one.
-_CLOSED_DEG = 300.0
-# A ring that is less sure than this, or has fewer objects, starts nothing.
-_LEAST_QUALITY = 0.15
 # Patches are smaller than the ring's own, so that rings close by do not get in: these shares are tried, with
 # so many samples a side.
 _PATCHES = (0.7, 0.4)
@@ -75,6 +73,11 @@ class _Ring:
         return cls(found, center, values["draw.x.radius.1"], values["draw.x.angle.1"], step_deg, count)
 
     @property
+    def slots(self) -> int:
+        """How many objects would close it."""
+        return round(360 / abs(self.step_deg))
+
+    @property
     def fit(self) -> Fit:
         """What its objects look like, and the pose."""
         return self.found.fit
@@ -90,15 +93,13 @@ def guesses_around(look: Session, rings: Sequence[Drawn]) -> Iterator[Guess]:
     """More rings around each of some, or a ring again along a line: the most objects of each ring first."""
     done: list[_Ring] = []
     for found in rings:
-        if min(found.fit.quality, 1.5 * found.sure) < _LEAST_QUALITY:
-            continue
         ring = _Ring.of(found)
         if len(found.fit.contrast) < FEWEST_OBJECTS or any(ring.about_as(other) for other in done):
             continue
         look.tell("more rings", 0.95)
         done.append(ring)
         yield from sorted(_rings_around(look.evidence, ring), key=lambda guess: -guess.promise)
-        if ring.count * abs(ring.step_deg) > _CLOSED_DEG:
+        if ring.count >= (1 - MOST_LACKING) * ring.slots:
             yield from _along_lines(look.evidence, ring)
 
 
@@ -122,6 +123,7 @@ def _guess(
     """
     fit, (first, last) = ring.fit, rings
     filling = rings_filling(first, last + 1, count, fan=fan, grows=growth != 0, moves=along is not None)
+    filling = standing(filling, upright=fit.pattern.upright)
     values = values_of(fit) | {
         "draw.x.radius.1": radius,
         "draw.x.radius.i": growth,
@@ -152,7 +154,7 @@ def _around(evidence: Evidence, ring: _Ring, side: float) -> tuple[Array, Array]
     By radius and slot, about 1 for an object, negative where none is seen, 0 out of sight; slot k lies at the
     ring's phase + k steps. Each radius has the best of itself and its neighbours.
     """
-    slots = round(360 / abs(ring.step_deg))
+    slots = ring.slots
     if slots > COUNTS[1]:
         return None
     fit, pattern = ring.fit, ring.fit.pattern
@@ -165,6 +167,8 @@ def _around(evidence: Evidence, ring: _Ring, side: float) -> tuple[Array, Array]
     out = np.stack([np.cos(angle), np.sin(angle)], -1).reshape(-1, 2)
     origin = torch.from_numpy(ring.center + r.reshape(-1, 1) * out)
     along = torch.from_numpy(side * np.sign(ring.step_deg) * np.stack([-out[:, 1], out[:, 0]], 1))
+    if pattern.upright:
+        along = along.new_tensor([side, 0.0]).expand_as(along)
     across = torch.stack([-along[:, 1], along[:, 0]], 1)
     size = evidence.image.size
     matrix = pattern.image_from_plane(fit.theta, size=size, focal_mm=fit.focal_mm)
@@ -352,13 +356,13 @@ def _along_lines(evidence: Evidence, ring: _Ring) -> Iterator[Guess]:
         if value < _ALIKE_SHARE * values[0]:
             break
         down, up, worth = _both_ways(alike_at, least=_ALIKE_SHARE * value)
-        promise = (1 + worth) * ring.count
+        promise = (1 + worth) * ring.slots
         if best is None or promise > best.promise + 1e-6:
             along = shift * unit
             best = _guess(
                 ring,
                 (0, down + up),
-                ring.count,
+                ring.slots,
                 promise=promise,
                 center=ring.center - down * along,
                 radius=ring.radius,
