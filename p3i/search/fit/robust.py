@@ -138,7 +138,7 @@ def moving_limits(filling: Filling, z: Tensor) -> Tensor:
 
 
 def inverse(matrix: Tensor) -> Tensor:
-    """The inverse of a matrix of information, whose empty directions stay as good as unknown."""
+    """The inverse of information [V, V], whose empty directions stay as good as unknown."""
     scale = matrix.diagonal().clamp(min=1e-12).rsqrt()
     even = matrix * scale[:, None] * scale + 1e-9 * torch.eye(len(matrix), dtype=matrix.dtype)
     return torch.linalg.inv(even) * scale[:, None] * scale
