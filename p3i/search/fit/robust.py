@@ -31,7 +31,8 @@ _TAIL = 4.0
 # fiftieth of a pixel; interpolation between pixels is no better.
 _VARIANCE, _LEAST_VARIANCE = 0.25, 0.0044
 _MOST_STEPS, _SCALINGS = 20, 5
-SETTLED = 1e-3
+SETTLED = 3e-3
+"""A fit ends with a step this small against the most that one may be."""
 _MOST_ALIKE = 0.6
 
 
