@@ -18,7 +18,16 @@ from p3i.search.fit.robust import moving_limits
 from p3i.search.forms.filling import Filling
 from p3i.search.look.contrast import score_of_curve
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import areas_px, find_about, frames, misfit, patch_contrast, spacing, whitening
+from p3i.search.look.patches import (
+    Frames,
+    areas_px,
+    find_about,
+    frames,
+    misfit,
+    patch_contrast,
+    spacing,
+    whitening,
+)
 from p3i.search.look.session import Session
 
 FOCALS_MM = (20.0, 300.0)
@@ -55,12 +64,14 @@ def measured(
 class Places:
     """Where a photo shows the objects about draws: `px` [N, 2], how sure each is [N], 0 where none is found.
 
-    `whiten` [N, 2, 2] takes differences of places to units of their noise.
+    `whiten` [N, 2, 2] takes differences of places to units of their noise, and `frames` are the patches moved
+    onto the objects.
     """
 
     px: Tensor
     certainty: Tensor
     whiten: Tensor
+    frames: Frames
 
 
 def objects_about(
@@ -77,8 +88,9 @@ def objects_about(
     where = frames(pattern, theta, index, side=side)
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
     found = find_about(evidence, matrix, where, index, weights.clamp(min=_LEAST_WEIGHT))
-    px, _ = project(matrix, where.points(found.offsets[:, None])[:, 0])
-    return Places(px, found.certainty.double(), whitening(matrix, where))
+    there = replace(where, origin=where.points(found.offsets[:, None])[:, 0])
+    px, _ = project(matrix, there.origin)
+    return Places(px, found.certainty.double(), whitening(matrix, where), there)
 
 
 def registered(

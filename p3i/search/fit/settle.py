@@ -9,7 +9,7 @@ Places are pixels of the photo as it was taken.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import torch
@@ -18,12 +18,12 @@ from torch import Tensor
 from p3i.grammar.ast import Program
 from p3i.interp.camera import FILM_MM, project, rotation
 from p3i.interp.lens import photo_from_straight
-from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM
+from p3i.search.fit.places import FOCAL_SPREAD, MOST_ZOOM, objects_about
 from p3i.search.fit.robust import Fitted, fitted, moving_limits
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.whole import whole_filling
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.patches import find_about, find_objects, frames, half_steps, spacing, whitening
+from p3i.search.look.patches import find_about, half_steps, spacing
 from p3i.search.look.straight import Straightened, shifted
 from p3i.search.look.thinned import thinned
 from p3i.search.look.upright import as_it_stands
@@ -148,10 +148,7 @@ def objects_of(
     `focal_mm` is the program's own, None for the one that `evidence` assumes. `seen`: the straightened photo
     that `evidence` is of, where its lens is in question; else places are of what `evidence` is of.
     """
-    whole = whole_filling(program)
-    if whole is None:
-        return None
-    filling, numbers = whole
+    filling, numbers = whole_filling(program)
     focal_mm = focal_mm or evidence.focal_mm
     pattern, theta, canvas = filling.pattern, filling.theta(numbers), evidence.image.size
     index = pattern.index[evidence.in_sight(pattern, theta, focal_mm=focal_mm)].double()
@@ -161,18 +158,16 @@ def objects_of(
     if shown < _FEWEST:
         return None
     side = spacing(pattern, theta)
-    found = find_objects(
-        evidence, pattern, theta, index, torch.ones(len(index)), side=side, focal_mm=focal_mm
-    )
+    ones = torch.ones(len(index))
+    found = objects_about(evidence, pattern, theta, index, ones, side=side, focal_mm=focal_mm)
     there = found.certainty > 0
     if int(there.sum()) < _FEWEST:
         return None
-    where = frames(pattern, theta, index[there], side=side)
     matrix = pattern.image_from_plane(theta, size=canvas, focal_mm=focal_mm)
     certainty = found.certainty[there]
     # Once more where they were found, in finer samples.
-    about = replace(where, origin=where.points(found.offsets[there][:, None])[:, 0])
-    closer = find_about(evidence, matrix, about, index[there], certainty, side=_CLOSER_SIDE)
+    about = found.frames.chosen(there)
+    closer = find_about(evidence, matrix, about, index[there], certainty.float(), side=_CLOSER_SIDE)
     offsets = torch.where((closer.lead > 0)[:, None], closer.offsets, 0.0)
     places, _ = project(matrix, about.points(offsets[:, None])[:, 0])
     return Objects(
@@ -180,8 +175,8 @@ def objects_of(
         numbers,
         index[there],
         places if seen is None else seen.points_on_photo(places),
-        whitening(matrix, where),
-        certainty.double(),
+        found.whiten[there],
+        certainty,
         shown / len(index),
         len(half_steps(pattern)),
         focal_mm,

@@ -49,9 +49,11 @@ def suffices(answer: Answer, needed: float | None) -> bool:
 
     Where the cells of a lattice are as much alike half a step away, the bits do not tell of its steps.
     """
-    if needed is not None:
-        return answer.score >= needed
-    return beyond_noise(answer.worth) and not _as_much_at_half_steps(answer)
+    return _enough(answer, needed) and (needed is not None or not _as_much_at_half_steps(answer))
+
+
+def _enough(answer: Answer, needed: float | None) -> bool:
+    return beyond_noise(answer.worth) if needed is None else answer.score >= needed
 
 
 def _as_much_at_half_steps(answer: Answer) -> bool:
@@ -72,7 +74,4 @@ def with_printed_scores(
     def printed(answer: Answer) -> float:
         return score_of_program(evidence, answer.program, focal_mm=answer.focal_mm, lens_k1=answer.lens_k1)
 
-    def worth_a_look(answer: Answer) -> bool:
-        return beyond_noise(answer.worth) if needed is None else answer.score >= needed
-
-    return [replace(one, score=printed(one)) if worth_a_look(one) else one for one in answers]
+    return [replace(one, score=printed(one)) if _enough(one, needed) else one for one in answers]

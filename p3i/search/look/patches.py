@@ -45,6 +45,10 @@ class Frames:
     along: Tensor
     across: Tensor
 
+    def chosen(self, which: Tensor) -> "Frames":
+        """Those of them that `which` [N] bool says."""
+        return Frames(self.origin[which], self.along[which], self.across[which])
+
     def points(self, offsets: Tensor) -> Tensor:
         """The plane points at `offsets` [..., N or 1, K, 2] -> [..., N, K, 2]."""
         a, b = offsets[..., 0, None], offsets[..., 1, None]
@@ -196,25 +200,6 @@ def patch_contrast(
     return contrast_of(Cells(values, known), weights=torch.ones(len(index)), rounds=rounds)
 
 
-def find_objects(
-    evidence: Evidence,
-    pattern: Pattern,
-    theta: Tensor,
-    index: Tensor,
-    weights: Tensor,
-    *,
-    side: float,
-    focal_mm: Tensor | float,
-) -> Instances:
-    """Search around each patch of `index` [N, 2] for the mean patch; `weights` [N] make that mean.
-
-    The offsets that come back are in patch sides, along and across.
-    """
-    where = frames(pattern, theta, index, side=side)
-    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    return find_about(evidence, matrix, where, index, weights)
-
-
 def find_about(
     evidence: Evidence,
     matrix: Tensor,
@@ -224,9 +209,10 @@ def find_about(
     *,
     side: int = SIDE,
 ) -> Instances:
-    """`find_objects` about given frames, in so many samples to a patch side.
+    """Search around each frame for the mean patch, in `side` samples each; `weights` [N] make that mean.
 
-    `matrix` [3, 3] takes program units to photo pixels; `index` [N, 2] is what the instances are called.
+    `matrix` [3, 3] takes program units to photo pixels; `index` [N, 2] is what the instances are called. The
+    offsets that come back are in patch sides, along and across.
     """
     colours = evidence.colours_for(sample_px(matrix, where, side=side))
     patches = read(colours, matrix, where, count=side + 2 * reach_of(side), side=side)

@@ -168,7 +168,7 @@ def sectors_of(
     focal_mm: float,
     along: int,
     cells: bool,
-    edges: bool = True,
+    edges: bool,
 ) -> Sectors:
     """The sectors about the draws at `index` [N, 2], read along the loop variable `along`, 0 for i or 1 for
     j; their colours alone, or their `edges` too.

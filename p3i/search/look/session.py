@@ -40,7 +40,7 @@ class Session:
 
     @property
     def generator(self) -> torch.Generator:
-        """The source of chance of the lattices, of sketches and of the paper's grid, seeded by the options.
+        """The source of chance of sketches and of the paper's grid, seeded by the options.
 
         What draws at random in other libraries (spots of rings, in numpy) seeds its own by the same option.
         """

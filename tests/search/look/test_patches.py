@@ -14,7 +14,7 @@ from p3i.search.look.cells import agreement
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import (
     Frames,
-    find_objects,
+    find_about,
     frames,
     half_steps,
     patch_contrast,
@@ -86,7 +86,9 @@ def test_an_object_that_is_missing_has_no_contrast() -> None:
 def test_objects_that_were_moved_are_found_where_they_are() -> None:
     nudges = {3: (2.0, 0.0), 7: (0.0, -1.5), 10: (-1.0, 1.0)}
     evidence = DrawnRing(nudges=nudges).evidence()
-    found = find_objects(evidence, PATTERN, THETA, INDEX, torch.ones(12), side=SIDE, focal_mm=35.0)
+    matrix = PATTERN.image_from_plane(THETA, size=evidence.image.size, focal_mm=35.0)
+    where = frames(PATTERN, THETA, INDEX, side=SIDE)
+    found = find_about(evidence, matrix, where, INDEX, torch.ones(12))
     true = np.array([nudges.get(number, (0.0, 0.0)) for number in range(12)])
     np.testing.assert_allclose(found.offsets.numpy() * SIDE, true, atol=0.15)
     assert float(found.certainty.min()) > 0.8
