@@ -9,10 +9,10 @@ from p3i.search.fit.places import values_of
 from p3i.search.forms.sketches import Sketched
 from p3i.search.result import NEEDED_BITS
 
-# Where the objects of a program agree so well, or it explains more than the rings and hybrids of photos do, a
-# pattern of another structure could not explain the photo better.
+# A program that explains more than the rings and hybrids of photos do leaves nothing to a pattern of another
+# structure; where its objects agree well, it need not explain as much.
 _BEYOND_DOUBT = 0.3
-_MOST_OF_CURVES = 1000.0
+_MOST_OF_CURVES = {True: 300.0, False: 1000.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class Best:
         Hybrids hold rings, and say more than these, however sure they are.
         """
         return not any(
-            answer.worth > (NEEDED_BITS if answer.score > _BEYOND_DOUBT else _MOST_OF_CURVES)
+            answer.worth > _MOST_OF_CURVES[answer.score > _BEYOND_DOUBT]
             and answer.structure != sketch.structure
             and not (sketch.structure == "hybrid" and answer.structure == "circular")
             for answer in self.asked()

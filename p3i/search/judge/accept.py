@@ -47,7 +47,7 @@ def suffices(answer: Answer, needed: float | None) -> bool:
     """Whether it is an answer: beyond noise by its `worth` in bits, or, where a person asked, by the score
     `needed`.
 
-    Where the cells of a lattice are as much alike half a step away, the bits do not tell of its steps.
+    Where objects are as much alike half a step away, the bits do not tell of the program's steps.
     """
     return _enough(answer, needed) and (needed is not None or not _as_much_at_half_steps(answer))
 
@@ -57,8 +57,9 @@ def _enough(answer: Answer, needed: float | None) -> bool:
 
 
 def _as_much_at_half_steps(answer: Answer) -> bool:
-    """Whether a lattice agrees no more than half a step away, by a score that is told of more than a few."""
-    return answer.structure == "lattice" and answer.score <= 0 and len(compile(answer.program).index) > FEW
+    """Whether objects agree no more than half a step away, by a score that a few cells would not have."""
+    few = answer.structure == "lattice" and len(compile(answer.program).index) <= FEW
+    return answer.score <= 0 and not few
 
 
 def with_printed_scores(

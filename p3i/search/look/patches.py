@@ -139,7 +139,13 @@ def sample_px(matrix: Tensor, where: Frames, *, side: int = SIDE) -> float:
 
 
 def read(
-    colours: ColourMap, matrix: Tensor, where: Frames, *, count: int = SIDE, side: int = SIDE
+    colours: ColourMap,
+    matrix: Tensor,
+    where: Frames,
+    *,
+    count: int = SIDE,
+    side: int = SIDE,
+    by_row: bool = False,
 ) -> Patches:
     """The features of `count` x `count` samples about each frame, `side` of them to a patch side.
 
@@ -158,22 +164,25 @@ def read(
     known = (sample_valid(colours.valid, at) & in_front).reshape(-1, rim, rim)
     # A gradient is known where the samples about it are.
     whole = F.max_pool2d((~known).float()[:, None], 3, stride=1)[:, 0] < 0.5
-    return Patches(_features(lab, whole), whole)
+    return Patches(_features(lab, whole, by_row=by_row), whole)
 
 
-def _features(lab: Tensor, known: Tensor) -> Tensor:
+def _features(lab: Tensor, known: Tensor, *, by_row: bool) -> Tensor:
     """[N, 3, s + 2, s + 2] colours -> [N, 12, s, s] normalised features, 0 where not known [N, s, s]."""
     gx = 0.5 * (lab[:, :, 1:-1, 2:] - lab[:, :, 1:-1, :-2])
     gy = 0.5 * (lab[:, :, 2:, 1:-1] - lab[:, :, :-2, 1:-1])
     gradient = torch.cat(double_angle(gx * gx, gy * gy, gx * gy), 1)
-    return torch.cat([_normalised(gradient, known), _normalised(lab[:, :, 1:-1, 1:-1], known)], 1)
+    colours = lab[:, :, 1:-1, 1:-1]
+    return torch.cat([_normalised(each, known, by_row=by_row) for each in (gradient, colours)], 1)
 
 
-def _normalised(values: Tensor, known: Tensor) -> Tensor:
-    """Each patch freed of its mean and divided by sqrt(its energy + the mean energy of all)."""
+def _normalised(values: Tensor, known: Tensor, *, by_row: bool) -> Tensor:
+    """Each patch freed of its mean, or each row of it, and divided by sqrt(its energy + that of all)."""
     mask = known[:, None].float()
     count = mask.sum((2, 3), keepdim=True).clamp(min=1)
-    values = (values - (values * mask).sum((2, 3), keepdim=True) / count) * mask
+    alike = (3,) if by_row else (2, 3)
+    mean = (values * mask).sum(alike, keepdim=True) / mask.sum(alike, keepdim=True).clamp(min=1)
+    values = (values - mean) * mask
     energy = values.square().sum((1, 2, 3), keepdim=True) / count
     typical = energy[energy > 0].median() if bool((energy > 0).any()) else energy.sum() + 1.0
     return values / (energy + typical).clamp(min=1e-9).sqrt()
@@ -194,7 +203,9 @@ def patch_contrast(
     every = torch.cat([torch.zeros(1, 2, dtype=torch.float64), steps, -steps])
     where = frames(pattern, theta, (index[None] + every[:, None]).reshape(-1, 2), side=side)
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where).cells()
+    # On a curve a rim is alike at every turn, and no object.
+    by_row = pattern.turning is not None and not pattern.upright
+    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where, by_row=by_row).cells()
     values = cells.values.reshape(len(every), len(index), *cells.values.shape[1:])
     known = cells.known.reshape(len(every), len(index), -1)
     return contrast_of(Cells(values, known), weights=torch.ones(len(index)), rounds=rounds)

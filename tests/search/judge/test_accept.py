@@ -52,13 +52,16 @@ def test_one_rule_serves_all_structures_whatever_their_score(structure: Structur
     assert suffices(sure, None) and not suffices(poor, None)
 
 
-def test_a_lattice_that_agrees_no_more_than_half_a_step_away_is_none_unless_its_cells_are_few() -> None:
-    none = answer(score=0.0, bits=500)
+@pytest.mark.parametrize("structure", ["lattice", "circular", "hybrid"])
+def test_what_agrees_no_more_than_half_a_step_away_is_none_unless_its_cells_are_few(
+    structure: StructureFound,
+) -> None:
+    none = answer(structure, score=0.0, bits=500)
     few = replace(
         none, program=loads("SetCameraPose(rx=1, ry=2)\nfor i in range(0, 6):\n    Draw(x=9*i, y=0)\n")
     )
     assert not suffices(none, None)
-    assert suffices(few, None) and suffices(answer("circular", score=0.0, bits=500), None)
+    assert suffices(few, None) == (structure == "lattice")
 
 
 @pytest.mark.parametrize(("printed", "enough"), [(NEEDED + 0.02, True), (NEEDED / 2, False)])

@@ -2,13 +2,16 @@
 
 import math
 
+import cv2
 import numpy as np
+import pytest
 import torch
 from drawn import DrawnRing
 
 from p3i.grammar.ast import Program
 from p3i.grammar.parser import parse
 from p3i.interp.compile import compile
+from p3i.search.config import SearchConfig
 from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.cells import agreement
 from p3i.search.look.evidence import Evidence
@@ -22,6 +25,7 @@ from p3i.search.look.patches import (
     sample_px,
     spacing,
 )
+from p3i.vision.image import Image
 
 RING = DrawnRing()
 FILLING = RING.filling()
@@ -74,6 +78,21 @@ def test_a_ring_has_contrast_at_its_count_and_none_where_half_steps_are_objects_
 def test_a_photo_without_objects_has_no_contrast() -> None:
     nothing = DrawnRing(missing=frozenset(range(12)))
     assert float(contrast_of(12, ring=nothing).abs().mean()) < 0.1
+
+
+@pytest.mark.parametrize("beyond", [0.5, 4.0, 6.0])
+def test_the_rim_of_a_disc_takes_no_contrast_from_the_objects_on_it(beyond: float) -> None:
+    round_ = np.radians(np.arange(0, 360, 3))
+    rim = np.array(RING.center) + (RING.radius + RING.size / 2 + beyond) * np.stack(
+        [np.cos(round_), np.sin(round_)], 1
+    )
+    plain = RING.image()
+    outside = np.ones(plain.valid.shape, np.uint8)
+    cv2.fillPoly(outside, [np.round(RING.seen(rim)).astype(np.int32)], 0)
+    on_disc = np.where(outside[..., None], np.float32(0.1), plain.pixels)
+    evidence = Evidence(Image(on_disc, plain.valid), SearchConfig(), 35.0)
+    found = patch_contrast(evidence, PATTERN, THETA, INDEX, side=SIDE, focal_mm=35.0)
+    assert float(found.min()) > 0.6
 
 
 def test_an_object_that_is_missing_has_no_contrast() -> None:
