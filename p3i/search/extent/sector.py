@@ -145,14 +145,13 @@ def _middle(sectors: Sectors, ring: Ring, template: Floats, rows: slice) -> tupl
     down = (np.arange(_SIDE) + 0.5) / _SIDE - 0.5
     allowed = (np.abs(down) < _NEAR)[:, None] & _within_one_kind(sectors, rows)
     # What is alike at every turn, a rim, is no object: without it objects and gaps are told apart. With it
-    # the middle of what was told is found.
-    without_rim = median - np.median(median, 2, keepdims=True)
-
-    def worth(colours: Floats) -> Array:
-        return worth_of_middles(template, colours=colours, appearance=colours)
-
-    column = int(np.where(allowed, worth(without_rim), -np.inf).max(0).argmax())
+    # the middle of what was told is found, if the rim is the object's own: both have a say.
+    told, apart_from_rim = (
+        worth_of_middles(template, colours=colours, appearance=colours)
+        for colours in (median, median - np.median(median, 2, keepdims=True))
+    )
+    column = int(np.where(allowed, apart_from_rim, -np.inf).max(0).argmax())
     apart = np.abs((np.arange(_SIDE) - column + _SIDE // 2) % _SIDE - _SIDE // 2)
-    found = np.where(allowed & (apart < _SIDE // 4), worth(median), -np.inf)
+    found = np.where(allowed & (apart < _SIDE // 4), told + apart_from_rim, -np.inf)
     y, x = divmod(int(np.argmax(found)), _SIDE)
     return float(down[y] * _SIDE), float((x + 0.5) / _SIDE - 0.5)
