@@ -16,15 +16,20 @@ from p3i.search.result import NEEDED_BITS
 PROGRAM = parse("SetCameraPose(rx=0, ry=0)\nfor i in range(0, 4):\n    Draw(x=9*i, y=0)\n")
 
 
-@pytest.mark.parametrize(("bits", "room"), [(NEEDED_BITS - 1, True), (NEEDED_BITS + 1, False)])
-def test_a_lattice_that_may_be_noise_leaves_room_for_rings_however_well_its_cells_agree(bits, room):
+@pytest.mark.parametrize(
+    ("bits", "score", "room"),
+    [(NEEDED_BITS - 1, 0.9, True), (200, 0.9, True), (400, 0.9, False), (400, 0.2, True), (1100, 0.2, False)],
+)
+def test_a_lattice_leaves_room_for_rings_unless_it_explains_much_and_less_suffices_if_cells_agree_well(
+    bits: float, score: float, room: bool
+) -> None:
     lattice, ring = (
         next(one for one in sketches(SearchConfig()) if one.structure == structure)
         for structure in ("lattice", "circular")
     )
     best = Best()
-    drawn = Drawn(PROGRAM, None, 0.9)  # pyright: ignore[reportArgumentType]
-    best.add(lattice, drawn, [Answer(PROGRAM, "lattice", 0.9, bits)])
+    drawn = Drawn(PROGRAM, None, score)  # pyright: ignore[reportArgumentType]
+    best.add(lattice, drawn, [Answer(PROGRAM, "lattice", score, bits)])
     assert best.leaves_room_for(ring) is room
 
 
