@@ -7,6 +7,8 @@ guess, and guards come when it is known which objects are there.
 from dataclasses import replace
 from functools import cache
 
+import torch
+
 from p3i.grammar.leaves import leaves, with_leaves
 from p3i.grammar.sketch import Sketch, parse_sketch
 from p3i.search.forms.filling import Filling, only_filling, standing
@@ -32,11 +34,14 @@ def curve(radius: str, angle: str, *, phase: bool = True, moves: bool = False) -
 
 
 @cache
+@torch.inference_mode(False)  # what is kept must serve searches by gradients too
 def lattice_filling() -> Filling:
     """The sketch of a lattice; which of its cells are drawn, its fit and its extent say."""
     return only_filling(spelled(LATTICE, i="0, 2", j="0, 2"))
 
 
+@cache
+@torch.inference_mode(False)
 def ring_filling(count: int, *, drawn: int | None = None, first: int = 0, phase: bool = True) -> Filling:
     """The sketch of a ring of `count` objects; of `drawn` objects side by side where it is not closed.
 
