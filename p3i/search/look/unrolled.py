@@ -121,8 +121,12 @@ def colours_at(colours: ColourMap, at: Floats) -> Floats:
 
 def orientation(gx: NDArray, gy: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """The `double_angle` of all colours together: gx, gy [..., 3] -> three [...]."""
-    xx, yy, xy = ((one * other).sum(-1) for one, other in ((gx, gx), (gy, gy), (gx, gy)))
-    return double_angle(xx, yy, xy)
+
+    def over_colours(one: NDArray, other: NDArray) -> NDArray:
+        # numpy sums along a last axis of three at a seventh of this speed.
+        return one[..., 0] * other[..., 0] + one[..., 1] * other[..., 1] + one[..., 2] * other[..., 2]
+
+    return double_angle(over_colours(gx, gx), over_colours(gy, gy), over_colours(gx, gy))
 
 
 def gradients(lab: NDArray) -> Floats:

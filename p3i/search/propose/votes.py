@@ -271,7 +271,7 @@ def _votes(tensor: NDArray, weights: Floats) -> Floats:
 def _transform(plane: NDArray) -> Floats:
     padded = np.zeros((_PADDED, _PADDED, 2), np.float32)
     padded[:_CANVAS, :_CANVAS, 0], padded[:_CANVAS, :_CANVAS, 1] = np.real(plane), np.imag(plane)
-    return cv2.dft(padded, flags=cv2.DFT_COMPLEX_OUTPUT, nonzeroRows=_CANVAS)  # pyright: ignore
+    return cv2.dft(padded, flags=cv2.DFT_COMPLEX_OUTPUT)  # pyright: ignore
 
 
 def _correlation(first: Floats, second: Floats) -> Floats:
