@@ -102,11 +102,13 @@ def polar_points(
     """
     x = center[0] + radii[:, None] * np.cos(angles)
     y = center[1] + radii[:, None] * np.sin(angles)
-    mapped = np.stack([x, y, np.ones_like(x)], -1) @ map_from_plane.T
-    front = mapped[..., 2] > 1e-6
-    at = (mapped[..., :2] / np.where(front, mapped[..., 2], 1.0)[..., None]).astype(np.float32)
+    across, down, depth = (row[0] * x + row[1] * y + row[2] for row in map_from_plane)
+    front = depth > 1e-6
+    depth = np.where(front, depth, 1.0)
+    at = np.stack([across / depth, down / depth], -1).astype(np.float32)
     height, width = colours.valid.shape
-    known = front & (at >= 0).all(-1) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
+    across, down = at[..., 0], at[..., 1]
+    known = front & (across >= 0) & (down >= 0) & (across <= width - 1) & (down <= height - 1)
     if not bool(colours.valid.all()):
         mask = colours.valid.numpy().astype(np.float32)
         known &= cv2.remap(mask, at[..., 0], at[..., 1], cv2.INTER_LINEAR) > 0.99

@@ -1,8 +1,8 @@
 """All shifts at once: how alike a view and its shifted copy are, by FFT, and the lattice in the peaks.
 
 Convention: a view is float32 [H, W, C] with weights [H, W] in 0..1 (0 = unknown), shifts are (x, y) in pixels
-of the view. OpenCV's transforms are used on packed real spectra: they were the fastest at these sizes, if they
-are not told which rows are empty, which keeps them from the processor's own.
+of the view. OpenCV's transforms are used on packed real spectra: they were the fastest at these sizes, unless
+they are told which rows are empty, which keeps them from the processor's own.
 """
 
 from dataclasses import dataclass
