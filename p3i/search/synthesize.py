@@ -64,7 +64,7 @@ def synthesize(
     The program has no header yet. A KeyboardInterrupt ends the search with the best that was found; a second
     one, while that is being finished, is raised.
     """
-    # Where no guess climbs by gradients, torch need not prepare for them: a tenth of the time.
+    # Where no guess climbs by gradients, torch need not prepare for them: a fifteenth of the time.
     climbs = asks_for_itself(config) or config.exhaustive_s is not None
     with limited_threads(config.threads), torch.inference_mode(not climbs):
         assumed = focal_of(image, config)

@@ -58,8 +58,7 @@ def _enough(answer: Answer, needed: float | None) -> bool:
 
 def _as_much_at_half_steps(answer: Answer) -> bool:
     """Whether objects agree no more than half a step away, by a score that a few cells would not have."""
-    few = answer.structure == "lattice" and len(compile(answer.program).index) <= FEW
-    return answer.score <= 0 and not few
+    return answer.score <= 0 and (answer.structure != "lattice" or len(compile(answer.program).index) > FEW)
 
 
 def with_printed_scores(
