@@ -85,11 +85,11 @@ def fitted(
     numbers, variance, steps = start, _VARIANCE, 0
     while True:
         points, slopes = with_slopes(points_of, numbers, limits)
-        residual = torch.einsum("nij,nj->ni", whiten, points - places)
-        rows = torch.einsum("nij,njp->nip", whiten, slopes)
+        residual = (whiten @ (points - places)[..., None])[..., 0]
+        rows = whiten @ slopes
         robust, variance = _weighed(residual, weights, variance)
-        information = torch.einsum("nip,n,niq->pq", rows, robust / variance, rows)
-        slope = torch.einsum("nip,n,ni->p", rows, robust / variance, residual)
+        weighed = (rows * (robust / variance)[:, None, None]).flatten(0, 1).mT
+        information, slope = weighed @ rows.flatten(0, 1), weighed @ residual.flatten()
         slope = slope + known * (numbers - mean) * limits
         # A direction in which even the longest step moves places by less than their noise is hardly followed.
         step = -inverse(information + torch.diag(known * limits**2 + 1)) @ slope

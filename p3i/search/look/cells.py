@@ -22,11 +22,13 @@ HALF_STEPS = torch.tensor([[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], dtype=torch.floa
 """The half steps of a two-directional index."""
 SIDE = 6
 """Samples along a cell's side wherever cells are compared."""
+# A mean that rests on less than this weight is of none.
+_LEAST_WEIGHT = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """The features of N cells at K samples each: values [N, K, C], known [N, K] bool."""
+    """The features of N cells at K samples each: values [N, K, C], 0 where not known; known [N, K] bool."""
 
     values: Tensor
     known: Tensor
@@ -73,9 +75,9 @@ def agreement(a: Tensor, b: Tensor, known: Tensor) -> Tensor:
 
 def mean_cell(cells: Cells, weights: Tensor) -> tuple[Tensor, Tensor]:
     """The weighted mean of the cells [K, C] and the weight [K] that each sample of it rests on."""
-    weight = cells.known * weights[:, None].to(cells.values)
-    total = weight.sum(0)
-    return torch.einsum("nk,nkc->kc", weight, cells.values) / total.clamp(min=1e-6)[:, None], total
+    weights = weights.to(cells.values)
+    total = weights @ cells.known.to(weights)
+    return _weighted_sum(cells.values, weights) / total.clamp(min=1e-6)[:, None], total
 
 
 def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
@@ -89,13 +91,39 @@ def mean_of_others(own: Tensor, known: Tensor, weights: Tensor) -> Tensor:
     mean = (weight * own).sum(0, keepdim=True) / total.clamp(min=1e-6)
     rest = total - weight
     others = (mean * total - weight * own) / rest.clamp(min=1e-6)
-    return torch.where(rest > 1e-3, others, 0.0)
+    return torch.where(rest > _LEAST_WEIGHT, others, 0.0)
 
 
 def agreement_with_others(cells: Cells, weights: Tensor) -> Tensor:
     """Each cell's agreement with the weighted mean of all the others, [N]."""
-    others = mean_of_others(cells.values, cells.known[..., None], weights)
-    return agreement(cells.values, others, cells.known)
+    return _with_others(cells, _over_channels(cells.values.square()), weights.to(cells.values))
+
+
+def _with_others(cells: Cells, energy: Tensor, weights: Tensor) -> Tensor:
+    """`agreement_with_others` of cells whose samples have this `energy` [N, K].
+
+    The mean of all but one is the sum S of all less that one's share, over what is left of their weight, so
+    that its products are those of S: nothing as large as the cells is made but the product with S.
+    """
+    own, known = weights[:, None], cells.known.to(weights)
+    total = _weighted_sum(cells.values, weights)
+    left = weights @ known - own * known
+    share = torch.where(left > _LEAST_WEIGHT, 1 / left.clamp(min=_LEAST_WEIGHT), 0.0)
+    crossed = _over_channels(cells.values * total)
+    inner = (share * (crossed - own * energy)).sum(1)
+    squared = _over_channels(total.square()) - 2 * own * crossed + own.square() * energy
+    others = (known * share.square() * squared).sum(1)
+    return 2 * inner / (energy.sum(1) + others).clamp(min=1e-6)
+
+
+def _weighted_sum(values: Tensor, weights: Tensor) -> Tensor:
+    """The sum over cells [N, K, C] by their weights [N]: [K, C]."""
+    return (weights @ values.flatten(1)).reshape(values.shape[1:])
+
+
+def _over_channels(values: Tensor) -> Tensor:
+    """The sum over the last of [..., C] numbers, which are few: as a product it takes half of the time."""
+    return values @ values.new_ones(values.shape[-1])
 
 
 def contrast(
@@ -126,14 +154,15 @@ def contrast_of(cells: Cells, *, weights: Tensor, rounds: int) -> Tensor:
     Shapes: cells.values [1 + 2 * M, N, K, C] and known [1 + 2 * M, N, K]: the whole cells, then those M half
     steps ahead, then those behind. `weights` [N] start the mean; then the contrast itself weighs.
     """
-    values, known = cells.values, cells.known
-    whole = Cells(values[0], known[0])
-    found = torch.zeros(values.shape[1])
-    weights = weights.float()
+    whole, weights = Cells(cells.values[0], cells.known[0]), weights.float()
+    energy = _over_channels(cells.values.square())
+    half, seen, own = cells.values[1:].flatten(2), cells.known[1:].to(weights), energy[1:].sum(-1)
+    found = torch.zeros(half.shape[1])
     for _ in range(rounds):
+        others = _with_others(whole, energy[0], weights)
         mean, _ = mean_cell(whole, weights)
-        others = agreement_with_others(whole, weights)
-        at_half = agreement(values[1:], mean, known[1:]).unflatten(0, (2, -1))
+        its = seen @ _over_channels(mean.square())
+        at_half = (2 * (half @ mean.flatten()) / (own + its).clamp(min=1e-6)).unflatten(0, (2, -1))
         found = others - at_half.mean(0).amax(0).clamp(min=0)
         weights = found.clamp(min=0)
         if float(weights.sum()) <= 0:

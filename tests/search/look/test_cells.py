@@ -56,7 +56,8 @@ def test_unknown_samples_have_no_say_in_agreement() -> None:
 
 def random_cells(seed: int = 0) -> Cells:
     generator = torch.Generator().manual_seed(seed)
-    return Cells(torch.randn(6, 9, 2, generator=generator), torch.rand(6, 9, generator=generator) > 0.2)
+    values, known = torch.randn(6, 9, 2, generator=generator), torch.rand(6, 9, generator=generator) > 0.2
+    return Cells(values * known[..., None], known)
 
 
 def test_each_cell_is_compared_with_the_mean_of_all_the_others() -> None:
