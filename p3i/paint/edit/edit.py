@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
-from p3i.paint.edit.cleared import cleared, covered, local_points, object_masks, windows
-from p3i.paint.edit.cutout import Cutout, Levels, cutout
+from p3i.paint.fill.cleared import cleared, covered, local_points, object_masks, windows
+from p3i.paint.fill.cutout import Cutout, Levels, cutout
 from p3i.place.flat import flat_of
 from p3i.place.moves import frames, pitch_px
 from p3i.place.outlines import chart_of, pitch

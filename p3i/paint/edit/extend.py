@@ -25,9 +25,9 @@ from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
 from p3i.grammar.printer import format_program
 from p3i.options.extend import SIDES, ExtendOptions, Margins
-from p3i.paint.edit.continued import Continued, continued, widened
-from p3i.paint.edit.cutout import cutout
+from p3i.paint.fill.cutout import cutout
 from p3i.paint.fill.stack import fill_by_stack
+from p3i.place.continued import Continued, continued, widened
 from p3i.place.flat import Flat, flat_of
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed, placed

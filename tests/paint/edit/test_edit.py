@@ -11,9 +11,9 @@ from p3i import loads
 from p3i.cli.main import run
 from p3i.errors import UsageError
 from p3i.options.edit import parse_scale
-from p3i.paint.edit.cleared import covered
-from p3i.paint.edit.cutout import cutout
 from p3i.paint.edit.edit import edit
+from p3i.paint.fill.cleared import covered
+from p3i.paint.fill.cutout import cutout
 from p3i.place.placed import placed
 from p3i.vision.image import Image, read_image
 from p3i.vision.sheet import project

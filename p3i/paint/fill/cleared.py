@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.paint.edit.cutout import Cutout
+from p3i.paint.fill.cutout import Cutout
 from p3i.place.moves import frames
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
