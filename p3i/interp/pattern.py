@@ -52,6 +52,11 @@ class Pattern:
                 return 1 if form.angle.j != 0 else 0
         return None
 
+    @property
+    def turns(self) -> bool:
+        """Whether what is drawn turns with a curve."""
+        return self.turning is not None and not self.upright
+
     def centers(self, theta: Tensor | None = None) -> Tensor:
         """The drawn points: theta [..., P] -> [..., N, 2], in program units."""
         return self.points_at(self.index, theta)

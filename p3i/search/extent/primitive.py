@@ -29,6 +29,7 @@ from p3i.search.look.cells import (
     sample_grid,
 )
 from p3i.search.look.evidence import Evidence
+from p3i.search.look.recurrence import MOST_READ
 from p3i.search.look.thinned import thinned
 
 # Rows: u and v of each sublattice of index 2 in units of the lattice's.
@@ -39,8 +40,6 @@ _DIFFERENT = 0.45
 _ALIKE = 0.3
 # Cells that agree with their own kind by less than this say nothing.
 _LEAST_AGREEMENT = 0.2
-# This many cells, of one coset or of all, are enough to tell one lattice from another.
-_MOST_CELLS = 200
 # Where so many of the cells know their coset, the cosets are kinds, and the doubled cell is the period:
 # halfway between one half, which is no rule, and all.
 _TOLD = 0.75
@@ -156,7 +155,7 @@ def _by_coset(
     for name in (None, "rgb"):
         level = evidence.level_for(side, name=name)
         yield [
-            read_cells(level, pattern, ground.theta, cells[thinned(cells, _MOST_CELLS)], sample_grid())
+            read_cells(level, pattern, ground.theta, cells[thinned(cells, MOST_READ)], sample_grid())
             for cells in (ground.index[coset == kind] for kind in np.unique(coset))
         ]
 

@@ -7,12 +7,11 @@ from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import fitted, measured, numbers_of, values_of
 from p3i.search.forms.filling import Filling, standing
 from p3i.search.forms.spelled import ring_filling
+from p3i.search.look.recurrence import MOST_HIDDEN
 from p3i.search.look.session import Session
 
 # Objects with less than this share of the plain ones' contrast are not there.
 _PRESENT = 0.4
-MOST_LACKING = 0.2
-"""A ring is closed where at most this share of it lacks in one piece."""
 # Growth looks this many places beyond an arc's ends.
 _REACH = 3
 
@@ -25,7 +24,7 @@ def as_far_as_it_goes(look: Session, fit: Fit) -> Fit:
     """
     count = len(fit.pattern.index)
     first, length = _best_run(fit)
-    if length >= (1 - MOST_LACKING) * count:
+    if length >= (1 - MOST_HIDDEN) * count:
         return fit
 
     def of(slots: int, *, drawn: int | None = None) -> Filling:

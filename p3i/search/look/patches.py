@@ -84,7 +84,7 @@ def frames(pattern: Pattern, theta: Tensor, index: Tensor, *, side: float) -> Fr
     """The patches of `side` program units about `index` [N, 2]."""
     origin = pattern.points_at(index, theta)
     variable = pattern.turning
-    if variable is None or pattern.upright:
+    if variable is None or not pattern.turns:
         along = torch.tensor([side, 0.0], dtype=torch.float64).expand_as(origin)
     else:
         tangent = tangents(pattern, theta, index, variable)
@@ -151,8 +151,9 @@ def read(
 
     `matrix` [3, 3] takes program units to photo pixels. Twelve channels: for each of L, a, b the gradient's
     strength and its double angle (as in vision/oriented.py, but in the frame's own directions, so that
-    objects that turn with a ring stay equal), then L, a, b themselves. Each patch is freed of its mean, and
-    gradients and colours are each scaled to mean energy 1/2 over all patches.
+    objects that turn with a ring stay equal), then L, a, b themselves. Each patch is freed of its mean, or,
+    `by_row`, of that of each of its rows along the curve, where a rim is alike at every turn, and no object;
+    and gradients and colours are each scaled to mean energy 1/2 over all patches.
     """
     rim = count + 2
     at, in_front = project(
@@ -203,9 +204,7 @@ def patch_contrast(
     every = torch.cat([torch.zeros(1, 2, dtype=torch.float64), steps, -steps])
     where = frames(pattern, theta, (index[None] + every[:, None]).reshape(-1, 2), side=side)
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    # On a curve a rim is alike at every turn, and no object.
-    by_row = pattern.turning is not None and not pattern.upright
-    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where, by_row=by_row).cells()
+    cells = read(evidence.colours_for(sample_px(matrix, where)), matrix, where, by_row=pattern.turns).cells()
     values = cells.values.reshape(len(every), len(index), *cells.values.shape[1:])
     known = cells.known.reshape(len(every), len(index), -1)
     return contrast_of(Cells(values, known), weights=torch.ones(len(index)), rounds=rounds)

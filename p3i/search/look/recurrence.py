@@ -41,8 +41,10 @@ ACROSS = 14
 """Samples across a sector."""
 UPRIGHT_BITS = 5.0
 """What it costs to say that objects on a curve do not turn with it: one kind of ring in thirty does so."""
-# More draws than this are judged by a part of them.
-_MOST_READ = 200
+MOST_READ = 200
+"""More draws than this are judged by a part of them."""
+MOST_HIDDEN = 0.2
+"""A ring goes all round, and a pattern is one, where at most this share of its objects lacks."""
 # A sector of which less is known is none, and fewer than this many say nothing.
 _LEAST_KNOWN = 0.7
 _FEWEST = 3
@@ -90,7 +92,7 @@ def recurrence_bits(
     become many so; they count for all only where those that were read save more than `needed`.
     """
     theta = pattern.theta if theta is None else theta
-    every, index = len(index), index[thinned(index, _MOST_READ)]
+    every, index = len(index), index[thinned(index, MOST_READ)]
     each = every / max(len(index), 1)
 
     edges = True
@@ -118,19 +120,41 @@ def recurrence_bits(
 
 
 def _bits(sectors: Sectors) -> float:
-    """The bits of sectors with a mean one; the lowest waves that say most are taken."""
-    waves = sectors.waves
-    number = len(waves)
+    """The bits of sectors with a mean one, some of which may be hidden by something else.
+
+    Hidden sectors are told by nothing, and named: which k of N costs the logarithm of the ways to choose
+    them, and how many of k. Without that a single object under a leaf would cost all others their evidence.
+    """
+    number = len(sectors.waves)
     if number < _FEWEST:
         return 0.0
-    energy = (np.abs(waves) ** 2).sum((0, 1))  # [M]
-    mean = waves.mean(0)
-    shared = number * (np.abs(mean) ** 2).sum(0) / np.maximum(energy, 1e-12)
-    samples = _independent(waves - mean)
+    by_wave = np.moveaxis(sectors.waves, 2, 0)
+    products = by_wave @ np.conj(np.swapaxes(by_wave, 1, 2))  # [M, N, N]
+    likest = np.argsort(-_with_all_others(products), kind="stable")
+    best, hidden = _bits_of(products, sectors.untold), 1
+    while number - hidden >= max(_FEWEST, (1 - MOST_HIDDEN) * number):
+        kept = np.sort(likest[: number - hidden])
+        named = math.log2(math.comb(number, hidden)) + math.log2(number)
+        best = max(best, _bits_of(products[:, kept[:, None], kept], sectors.untold) - named)
+        hidden *= 2
+    return best
+
+
+def _with_all_others(products: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """How like each of N sectors is to the sum of the others, by their products [M, N, N]: [N]."""
+    return (products.sum(2) - np.diagonal(products, axis1=1, axis2=2)).real.sum(0)
+
+
+def _bits_of(products: NDArray[np.complex64], untold: float) -> float:
+    """The bits of sectors whose waves have these products [M, N, N]; the lowest waves that say most count."""
+    number = products.shape[1]
+    energy = np.diagonal(products, axis1=1, axis2=2).real.sum(1)
+    shared = products.sum((1, 2)).real / (number * np.maximum(energy, 1e-12))
+    samples = _independent(products)
     best = 0.0
     for last in range(1, len(shared) + 1):
         total = samples[:last].sum()
-        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - sectors.untold)
+        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - untold)
         if share > 1 / number:
             best = max(best, float(total) * likelihood_ratio(share, number))
     # One of so many choices was made.
@@ -147,11 +171,13 @@ def likelihood_ratio(share: float, number: int) -> float:
     return nats / math.log(2)
 
 
-def _independent(rest: NDArray[np.complex64]) -> NDArray[np.float64]:
-    """How many independent samples each wave of sectors has, by what is not shared: [N, K, M] -> [M]."""
-    number = len(rest)
-    by_wave = np.moveaxis(rest, 2, 0)
-    gram = np.abs(by_wave @ np.conj(np.swapaxes(by_wave, 1, 2))) ** 2  # [M, N, N]
+def _independent(products: NDArray[np.complex64]) -> NDArray[np.float64]:
+    """How many independent samples each wave of sectors has, by what is not shared: [M, N, N] -> [M]."""
+    number = products.shape[1]
+    # The products of what is left of each sector without their mean.
+    to_mean = products.mean(2, keepdims=True)
+    rest = products - to_mean - np.conj(np.swapaxes(to_mean, 1, 2)) + to_mean.mean(1, keepdims=True)
+    gram = np.abs(rest) ** 2
     own = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
     alike = gram.sum((1, 2)) - np.diagonal(gram, axis1=1, axis2=2).sum(1)
     every = own.sum(1) ** 2 - (own**2).sum(1)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import project
 from p3i.search.config import FEWEST_OBJECTS
-from p3i.search.fit.arc import MOST_LACKING
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import numbers_of, values_of
 from p3i.search.forms.filling import standing
@@ -25,6 +24,7 @@ from p3i.search.forms.spelled import rings_filling
 from p3i.search.look.cells import Cells, agreement, mean_cell
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import Frames, frames, read, sample_px
+from p3i.search.look.recurrence import MOST_HIDDEN
 from p3i.search.look.session import Session
 from p3i.search.look.unrolled import COUNTS, RADII
 from p3i.search.propose.views import gradient_view
@@ -99,7 +99,7 @@ def guesses_around(look: Session, rings: Sequence[Drawn]) -> Iterator[Guess]:
         look.tell("more rings", 0.95)
         done.append(ring)
         yield from sorted(_rings_around(look.evidence, ring), key=lambda guess: -guess.promise)
-        if ring.count >= (1 - MOST_LACKING) * ring.slots:
+        if ring.count >= (1 - MOST_HIDDEN) * ring.slots:
             yield from _along_lines(look.evidence, ring)
 
 
@@ -180,7 +180,7 @@ def _around(evidence: Evidence, ring: _Ring, side: float) -> tuple[Array, Array]
         torch.cat([own.across, across[seen]]),
     )
     colours = evidence.colours_for(sample_px(matrix, own, side=_SAMPLES))
-    cells = read(colours, matrix, every, count=_SAMPLES, side=_SAMPLES).cells()
+    cells = read(colours, matrix, every, count=_SAMPLES, side=_SAMPLES, by_row=pattern.turns).cells()
     ours = Cells(cells.values[: len(fit.index)], cells.known[: len(fit.index)])
     mean, _ = mean_cell(ours, fit.contrast.clamp(min=0))
     alike = agreement(cells.values, mean, cells.known).clamp(min=0).numpy().astype(float)

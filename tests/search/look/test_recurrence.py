@@ -72,6 +72,16 @@ def test_a_ring_of_spots_saves_most_at_its_own_count() -> None:
         assert saved(evidence, ring(count)) < 0.6 * true
 
 
+def test_an_object_under_something_else_takes_none_of_the_others_evidence() -> None:
+    covered = spots(12, 90)
+    x, y = (SIDE - 1) / 2 + 90, (SIDE - 1) / 2
+    cv2.circle(covered, (round(x), round(y)), 20, 0.35, -1, cv2.LINE_AA)
+    arc = ring(12).replace("range(0, 12)", "range(1, 12)")
+    evidence = picture(covered)
+    # All but what it costs to say which one is hidden: one of twelve, and that it is one.
+    assert saved(evidence, ring(12)) > saved(evidence, arc) - 2 * np.log2(12) - 1
+
+
 def test_a_rim_that_looks_the_same_at_every_turn_tells_no_count() -> None:
     for blur in (1.0, 4.0):
         for radius in (82.0, 90.0, 98.0):
