@@ -110,16 +110,20 @@ class Journal:
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:
-    """The whole lines of a journal; a last one that a kill cut short is passed over, and ended."""
-    found, text = [], path.read_text(encoding="utf-8")
+    """The whole lines of a journal; a last one that a kill cut short is passed over, and ended.
+
+    Raises FileError for a file that is something else.
+    """
+    found, text = [], path.read_text(encoding="utf-8", errors="replace")
     for line in text.splitlines():
         with contextlib.suppress(ValueError):
             found.append(json.loads(line))
+    known = all(isinstance(line, dict) and line.keys() & {"settings", "photo"} for line in found)
+    if text.strip() and not (found and known):
+        raise FileError(f"{path} is no journal of this benchmark")
     if text and not text.endswith("\n"):
         with path.open("a", encoding="utf-8") as stream:
             stream.write("\n")
-    if text.strip() and not all(isinstance(line, dict) for line in found or [None]):
-        raise FileError(f"{path} is no journal of this benchmark")
     return found
 
 
@@ -243,7 +247,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--fold", metavar="K/N", help="part K of N of the set, as of p3i eval")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="take every Nth photo")
     parser.add_argument("--photos", dest="limit", type=int, metavar="N", help="take N photos at most")
-    parser.add_argument("--seconds", type=float, help="begin no further photo after so long")
+    parser.add_argument("--seconds", type=float, help="begin no further photo after so much CPU time")
     parser.add_argument("--steps", type=int, metavar="N", help="steps of training of npn, not its default")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, metavar="FILE", help="the journal, JSON lines")
@@ -279,10 +283,10 @@ def measured(given: argparse.Namespace) -> None:
     options = {} if given.steps is None else {"steps": given.steps}
     InpaintOptions(method="npn", **options)
     settings = {"seed": given.seed, "steps": given.steps}
-    journal, begun = Journal(given.out, settings), time.monotonic()
+    journal, begun = Journal(given.out, settings), time.process_time()
     ways = fills(given.methods, options)
     for case in () if given.report else cases(given):
-        if given.seconds is not None and time.monotonic() - begun > given.seconds:
+        if given.seconds is not None and time.process_time() - begun > given.seconds:
             break
         fill_all(case, ways, journal, given)
     missed = sum(len(kinds) for (_, kinds), program in journal.searches.items() if program is None)

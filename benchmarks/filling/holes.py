@@ -60,7 +60,7 @@ def in_groups(cut: Sequence[Hole], centers: np.ndarray) -> list[list[Hole]]:
     for hole in cut:
         for group in groups:
             together = np.any([one.mask for one in (*group, hole)], axis=0)
-            if share(together) <= _MOST_HIDDEN and hole.kind not in COMPLETIONS:
+            if share(together) <= _MOST_HIDDEN:
                 group.append(hole)
                 break
         else:
@@ -156,8 +156,8 @@ def _completions(parts: Sequence[Ground], random: np.random.Generator) -> Iterat
     low = np.concatenate(corners).min(0)
     high = np.concatenate(corners).max(0)
     # What is left of a cell at the photo's edge would be a sliver in sight.
-    low = np.where(low < cell_px, 0, np.rint(low)).astype(int)
-    high = np.where(high > frame - cell_px, frame, np.rint(high)).astype(int)
+    low = np.where(low < cell_px, 0, np.floor(low)).astype(int)
+    high = np.where(high > frame - cell_px, frame, np.ceil(high) + 1).astype(int)
     centers = np.concatenate([part.centers() for part in parts])
     span = high - low
     for kind in COMPLETIONS:

@@ -39,8 +39,7 @@ def quilted(picture: np.ndarray, hole: np.ndarray, *, side: int | None = None, s
         return np.ascontiguousarray(flipped.transpose(*along, *range(2, flipped.ndim)))
 
     filled = _rastered(turned(picture), turned(hole), side, np.random.default_rng(seed))
-    back = filled.transpose(*along, 2)[::down, ::right]
-    return np.where(hole[:, :, None], back, picture)
+    return np.ascontiguousarray(filled.transpose(*along, 2)[::down, ::right])
 
 
 def _rastered(picture: np.ndarray, hole: np.ndarray, side: int, random: np.random.Generator) -> np.ndarray:
