@@ -261,6 +261,29 @@ def test_completions_hide_a_quarter_to_a_half_up_to_the_edge(kind: str) -> None:
                 assert within(together, centers).mean() <= 1 / 6
 
 
+@pytest.mark.parametrize("method", ["stack", "guided patchmatch", "patchmatch", "quilting", "telea", "ns"])
+def test_each_method_fills_the_hole_alone_and_never_from_what_is_transparent(method: str) -> None:
+    dots = np.full((160, 200, 3), 0.2, np.float32)
+    for x in range(10, 200, 20):
+        for y in range(10, 160, 20):
+            cv2.circle(dots, (x, y), 6, (0.7, 0.8, 0.7), -1)
+    size = Size(200, 160)
+    step, first = 20 / size.unit_px, -90 / size.unit_px
+    program = p3i.loads(
+        f"SetCameraPose(rx=0, ry=0)\nfor i in range(0, 10):\n    for j in range(-1, 9):\n"
+        f"        Draw(x={step}*i + {first}, y={step}*j + {first})\n"
+    )
+    hole, gone = box((160, 200), 60, 60, 20, 40), box((160, 200), 50, 100, 40, 60)
+    pixels = np.where(gone[..., None], np.float32([1, 0, 1]), np.where(hole[..., None], np.float32(0), dots))
+    (fill,) = module("filling.methods").fills([method], {}).values()
+    filled = fill(Image(pixels, ~gone), program, hole)
+    assert filled.dtype == np.float32 and filled.shape == dots.shape
+    assert np.allclose(filled[~hole & ~gone], dots[~hole & ~gone], atol=1 / 255)
+    assert (filled[hole][:, 1] > 0.15).all()
+    if method == "stack":
+        assert np.abs(filled - dots)[hole].mean() < 0.02
+
+
 def rows_of(l1: dict[str, list[float]], **changes: Any) -> list[Any]:
     """A row for each method and photo, of one kind of hole."""
     row = module("filling.tables").Row

@@ -11,8 +11,8 @@ from filling.quilting import quilted
 from p3i.vision.image import Image
 
 METHODS = ("stack", "npn", "guided patchmatch", "patchmatch", "quilting", "telea", "ns")
-_RADIUS_PX = 3
-_PATCH_PX = 7
+_OPENCV_RADIUS_PX = 3
+_PATCH_RADIUS_PX = 7
 
 Fill = Callable[[Image, p3i.Program, np.ndarray], np.ndarray]
 """A photo whose hole is black, its program, the hole bool [H, W] -> pixels float32 [H, W, 3] in 0..1."""
@@ -28,7 +28,7 @@ def fills(methods: Sequence[str], options: Mapping[str, Any]) -> dict[str, Fill]
 
     def opencv(flag: int) -> Fill:
         return lambda photo, _program, hole: _pixels(
-            cv2.inpaint(_values(photo), _unknown(photo, hole).astype(np.uint8), _RADIUS_PX, flag)
+            cv2.inpaint(_values(photo), _unknown(photo, hole).astype(np.uint8), _OPENCV_RADIUS_PX, flag)
         )
 
     known = {
@@ -47,9 +47,8 @@ def _plain_patchmatch(photo: Image, _program: p3i.Program, hole: np.ndarray) -> 
     from patchmatch import patch_match
 
     patch_match.set_random_seed(0)
-    return _pixels(
-        patch_match.inpaint(_values(photo), _unknown(photo, hole).astype(np.uint8), patch_size=_PATCH_PX)
-    )
+    unknown = _unknown(photo, hole).astype(np.uint8)
+    return _pixels(patch_match.inpaint(_values(photo), unknown, patch_size=_PATCH_RADIUS_PX))
 
 
 def _unknown(photo: Image, hole: np.ndarray) -> np.ndarray:
