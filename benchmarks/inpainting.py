@@ -12,8 +12,9 @@ across. Places follow from the seed and the photo's name.
 Only then, what is hidden being unknown, the program is searched for; holes that hide much have a search of
 their own. Where it is not within tolerance of the annotation (the structure, a lattice's cell, half of a
 ring's objects, the pose within 2 degrees where the annotation vouches for it) the hole is counted and left
-out. Each method fills each hole, the others of the search in sight. The measures are those of
-filling/measures.py; the report is Markdown.
+out. Each method fills each hole, the others of the search in sight; with --together they stay hidden, and the
+network's training is kept from one to the next. The measures are those of filling/measures.py; the report is
+Markdown.
 
 The journal (--out) has a line for each search and each fill, and a call that finds one there does not do it
 again: it may be stopped and gone on with, and methods may be added. Fills of changed code belong into another
@@ -25,6 +26,7 @@ import argparse
 import contextlib
 import dataclasses
 import json
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -37,7 +39,7 @@ import torch
 from filling.ground import Ground, grounds
 from filling.holes import COMPLETIONS, KINDS, Hole, holes, in_groups
 from filling.measures import judged
-from filling.methods import METHODS, Fill, fills
+from filling.methods import METHODS, fills
 from filling.sheets import write_sheet
 from filling.tables import Row, report
 
@@ -176,49 +178,65 @@ def searched(case: Case, photo: Image, hidden: Sequence[Hole]) -> str | None:
     return None if not off.structure_ok or off.lattice_ok is False or ring_missed else p3i.dumps(found)
 
 
-def fill_all(case: Case, ways: Mapping[str, Fill], journal: Journal, given: argparse.Namespace) -> None:
+def fill_all(case: Case, journal: Journal, given: argparse.Namespace) -> None:
     """Search beside the holes of a photo and fill them, as far as the journal has it not."""
     photo = case.photo()
     found, parts = cut(case, photo, given.holes, given.seed)
     if not found:
         return
     pattern = np.any([part.mask() for part in parts], axis=0)
-    truth = np.rint(photo.pixels.clip(0, 1) * 255)
-    begun = {row.method for row in journal.rows if row.photo == case.name}
     for group in in_groups(found, np.concatenate([part.centers() for part in parts])):
         kinds = tuple(hole.kind for hole in group)
         if (case.name, kinds) not in journal.searches:
             journal.add_search(case.name, kinds, searched(case, photo, group))
         text = journal.searches[case.name, kinds]
-        print(
-            f"{case.name:36s} {', '.join(kinds)}: {'a program' if text else 'none within tolerance'}",
-            flush=True,
-        )
-        if text is None:
-            continue
-        program = p3i.loads(text)
+        told = "none within tolerance" if text is None else "a program"
+        print(f"{case.name:36s} {', '.join(kinds)}: {told}", flush=True)
+        if text is not None:
+            fill_group(case, photo, pattern, group, p3i.loads(text), journal, given)
+
+
+def fill_group(
+    case: Case,
+    photo: Image,
+    pattern: np.ndarray,
+    group: Sequence[Hole],
+    program: p3i.Program,
+    journal: Journal,
+    given: argparse.Namespace,
+) -> None:
+    """Fill the holes of one search by every method that the journal has not; `pattern` bool [H, W]."""
+    truth, every = np.rint(photo.pixels.clip(0, 1) * 255), np.any([hole.mask for hole in group], axis=0)
+    begun: set[str] = set()
+    with tempfile.TemporaryDirectory() as folder:
+        options = network_options(given) | ({"checkpoint": Path(folder) / "npn"} if given.together else {})
+        ways = fills(given.methods, options)
         for hole in group:
-            hidden = np.where(hole.mask[:, :, None], np.float32(0), photo.pixels)
-            seen = dataclasses.replace(photo, pixels=hidden)
+            hidden = every if given.together else hole.mask
+            seen = dataclasses.replace(
+                photo,
+                pixels=np.where(hidden[:, :, None], np.float32(0), photo.pixels),
+                valid=photo.valid & ~hidden if given.together else photo.valid,
+            )
             shown: dict[str, np.ndarray] = {}
             for method, fill in ways.items():
-                if journal.has(case.name, hole.kind, method) and given.pictures is None:
+                known = journal.has(case.name, hole.kind, method)
+                if known and given.pictures is None:
                     continue
                 started = time.process_time()
                 filled = fill(seen, program, hole.mask)
                 spent = time.process_time() - started
                 shown[method] = np.rint(filled.clip(0, 1) * 255)
-                if journal.has(case.name, hole.kind, method):
+                if known:
                     continue
+                off = judged(truth, shown[method], hole.mask, pattern=pattern, known=photo.valid)
                 row = Row(
                     photo=case.name,
                     drawn=case.path is None,
                     hole=hole.kind,
                     method=method,
                     pixels=int(hole.mask.sum()),
-                    **dataclasses.asdict(
-                        judged(truth, shown[method], hole.mask, pattern=pattern, known=photo.valid)
-                    ),
+                    **dataclasses.asdict(off),
                     cpu_s=spent,
                     first=method not in begun,
                 )
@@ -229,6 +247,13 @@ def fill_all(case: Case, ways: Mapping[str, Fill], journal: Journal, given: argp
             if given.pictures is not None:
                 stem = f"{Path(case.name).stem}-{hole.kind}".replace(" ", "_")
                 write_sheet(given.pictures / f"{stem}.png", truth, hole.mask, shown)
+
+
+def network_options(given: argparse.Namespace) -> dict[str, Any]:
+    """The fields of InpaintOptions that the arguments set. Raises UsageError for a value out of range."""
+    options = {} if given.steps is None else {"steps": given.steps}
+    InpaintOptions(method="npn", **options)
+    return options
 
 
 def parsed() -> argparse.Namespace:
@@ -254,6 +279,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument(
         "--pictures", type=Path, metavar="DIR", help="write a strip for each hole, to look at"
     )
+    parser.add_argument("--together", action="store_true", help="all holes of a search hidden from its fills")
     parser.add_argument("--report", action="store_true", help="only report what the journal has")
     given = parser.parse_args()
     if given.photos is None and not given.scenes and not given.report:
@@ -274,27 +300,27 @@ def main() -> None:
     cv2.setNumThreads(1)
     try:
         measured(given)
-    except P3IError as error:
+    except (P3IError, OSError) as error:
         raise SystemExit(f"error: {error}") from None
 
 
 def measured(given: argparse.Namespace) -> None:
     """Fill what the journal has not, and print the report on all of it. Raises P3IError for wrong input."""
-    options = {} if given.steps is None else {"steps": given.steps}
-    InpaintOptions(method="npn", **options)
-    settings = {"seed": given.seed, "steps": given.steps}
+    network_options(given)
+    settings = {"seed": given.seed, "steps": given.steps} | ({"together": True} if given.together else {})
     journal, begun = Journal(given.out, settings), time.process_time()
-    ways = fills(given.methods, options)
     for case in () if given.report else cases(given):
         if given.seconds is not None and time.process_time() - begun > given.seconds:
             break
-        fill_all(case, ways, journal, given)
+        fill_all(case, journal, given)
+    if not (journal.searches or given.report):
+        raise UsageError("no hole was cut: no photo has such a name, or none has room for such a hole")
     missed = sum(len(kinds) for (_, kinds), program in journal.searches.items() if program is None)
     asked = sum(len(kinds) for _, kinds in journal.searches)
     pictures = len({photo for photo, _ in journal.searches})
     print(
-        f"\n{pictures} pictures with {asked} holes in {len(journal.searches)} searches; {missed} of them "
-        f"without a program within tolerance beside them\n\n{report(journal.rows, METHODS)}"
+        f"\n{pictures} pictures with {asked} holes in {len(journal.searches)} searches; beside {missed} of them "
+        f"no program within tolerance is found\n\n{report(journal.rows, METHODS)}"
     )
 
 

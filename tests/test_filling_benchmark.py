@@ -306,7 +306,7 @@ def test_the_report_compares_over_the_same_holes_and_is_markdown() -> None:
     assert "| 1 cell | 0.98 (" in told and "0.50 (0.50 to 0.50) |" in told
     assert "npn below stack in L1 on 67% of 3 photos, 1.7% above it on the mean" in told
     assert "patchmatch below stack in L1 on 0% of 2 photos, 100.0% above it" in told
-    assert "1.00 (1.00 after a photo's first)" in told
+    assert "1.00 (1.00 after the first)" in told
     for table in (part for part in told.split("\n\n") if part.startswith("|")):
         assert len({line.count("|") for line in table.splitlines()}) == 1
 
@@ -349,6 +349,38 @@ def test_no_search_and_no_fill_sees_a_hidden_pixel(
     assert f"1 pictures with {len(benchmark.filled)} holes" in capsys.readouterr().out
 
 
+def test_together_no_fill_sees_a_pixel_that_the_search_did_not(
+    benchmark: types.SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[Any] = []
+
+    def fills(methods: list[str], options: dict[str, Any]) -> dict[str, Any]:
+        given.append(options["checkpoint"])
+
+        def fill(photo: Image, _program: p3i.Program, hole: np.ndarray) -> np.ndarray:
+            hidden = benchmark.unknown[-1]
+            assert not photo.pixels[hidden].any() and np.array_equal(photo.valid, ~hidden)
+            benchmark.filled.append(hole)
+            return photo.pixels
+
+        return dict.fromkeys(methods, fill)
+
+    monkeypatch.setattr(benchmark.script, "fills", fills)
+    journal = benchmark.folder / "rows.jsonl"
+    benchmark.run("--methods", "npn", "--together", "--out", str(journal))
+    rows = [line for line in map(json.loads, journal.read_text().splitlines()) if "method" in line]
+    assert len(rows) == len(benchmark.filled) > len(benchmark.unknown) == len(set(given))
+    assert sum(row["first"] for row in rows) == len(benchmark.unknown)
+    with pytest.raises(SystemExit, match="other settings"):
+        benchmark.run("--methods", "npn", "--out", str(journal))
+
+
+def test_photos_that_give_no_hole_are_told_of(benchmark: types.SimpleNamespace) -> None:
+    for arguments in (["--only", "moon"], ["--holes", "quarter of ring"]):
+        with pytest.raises(SystemExit, match="no hole was cut"):
+            benchmark.run(*arguments)
+
+
 def test_a_journal_is_gone_on_with_and_one_of_another_seed_is_refused(
     benchmark: types.SimpleNamespace,
 ) -> None:
@@ -377,7 +409,7 @@ def test_an_answer_out_of_tolerance_is_counted_and_nothing_is_filled(
     monkeypatch.setattr(p3i, "synth", lambda *_, **__: types.SimpleNamespace(program=wrong))
     benchmark.run("--methods", "stack", "--holes", "1 cell")
     assert not benchmark.filled
-    assert "with 1 holes in 1 searches; 1 of them without a program" in capsys.readouterr().out
+    assert "with 1 holes in 1 searches; beside 1 of them no program" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["a list", "a record", "a text"])

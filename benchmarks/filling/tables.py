@@ -17,7 +17,7 @@ _RESAMPLES = 2000
 class Row:
     """What one method made of one hole; the measures are those of filling/measures.py.
 
-    `pixels` of the hole; `first`: whether this is the first hole of the photo that the method filled.
+    `pixels` of the hole; `first`: whether the method filled it as the first of its search.
     """
 
     photo: str
@@ -72,7 +72,7 @@ def _by_method(rows: Sequence[Row], methods: Sequence[str]) -> str:
         cpu = f"{np.mean(_means(mine, lambda row: row.cpu_s)):.2f}"
         later = [row.cpu_s for row in mine if not row.first]
         if method == "npn" and later:
-            cpu += f" ({np.mean(later):.2f} after a photo's first)"
+            cpu += f" ({np.mean(later):.2f} after the first)"
         numbers = [
             f"{l1.mean():.1f}",
             _interval(l1[:, None]),
