@@ -319,8 +319,8 @@ def measured(given: argparse.Namespace) -> None:
     asked = sum(len(kinds) for _, kinds in journal.searches)
     pictures = len({photo for photo, _ in journal.searches})
     print(
-        f"\n{pictures} pictures with {asked} holes in {len(journal.searches)} searches; beside {missed} of them "
-        f"no program within tolerance is found\n\n{report(journal.rows, METHODS)}"
+        f"\n{pictures} pictures with {asked} holes in {len(journal.searches)} searches; beside {missed} "
+        f"of them no program within tolerance is found\n\n{report(journal.rows, METHODS)}"
     )
 
 
