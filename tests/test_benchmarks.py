@@ -5,7 +5,6 @@ import importlib
 import pkgutil
 import re
 import runpy
-import sys
 import types
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,9 +18,8 @@ import p3i
 from p3i.interp.camera import Camera, project
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.size import Size
-from p3i.vision.image import Image
 
-SCRIPTS = sorted((Path(__file__).parent.parent / "benchmarks").glob("*.py"))
+SCRIPTS = sorted((Path(__file__).parent.parent / "benchmarks").rglob("*.py"))
 
 
 def names_of_p3i(path: Path) -> Iterator[str]:
@@ -54,36 +52,6 @@ def test_the_ablations_replace_functions_by_names_that_this_test_sees() -> None:
     names = set(names_of_p3i(next(path for path in SCRIPTS if path.stem == "ablations")))
     assert "p3i.search.fit.grow.refine" in names
     assert not is_there("p3i.search.fit.grow.no_such") and not is_there("p3i.search:register")
-
-
-def test_the_search_of_the_filling_benchmark_sees_no_hidden_pixel(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Holes are cut by the annotation, and unknown to the one search for the photo's program."""
-    metrics = types.ModuleType("skimage.metrics")
-    monkeypatch.setattr(metrics, "structural_similarity", lambda *_, **__: 1.0, raising=False)
-    monkeypatch.setitem(sys.modules, "skimage.metrics", metrics)
-    inpainting = runpy.run_path(str(next(path for path in SCRIPTS if path.stem == "inpainting")))
-    p3i.examples(tmp_path, lattices=1, rings=0, hybrids=0)
-    truth = p3i.load(next((tmp_path / "programs").iterdir()))
-    unknown: list[np.ndarray] = []
-    filled: list[np.ndarray] = []
-
-    def found(_photo: object, *, mask: np.ndarray) -> types.SimpleNamespace:
-        unknown.append(mask)
-        return types.SimpleNamespace(program=truth)
-
-    def fill(photo: Image, _program: p3i.Program, hole: np.ndarray) -> np.ndarray:
-        assert not photo.pixels[hole].any()
-        filled.append(hole)
-        return photo.pixels
-
-    monkeypatch.setattr(p3i, "synth", found)
-    monkeypatch.setitem(inpainting["main"].__globals__, "fills", lambda *_, **__: {"stack": fill})
-    monkeypatch.setattr(sys, "argv", ["inpainting.py", str(tmp_path)])
-    inpainting["main"]()
-    (mask,) = unknown
-    assert filled and all(mask[hole].all() for hole in filled)
 
 
 def shipped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
