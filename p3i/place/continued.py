@@ -42,7 +42,7 @@ _SEEN = 0.5
 _TURN_SLACK = 0.1
 
 AGAINST_BITS = 3.0
-"""A line of cells ends the pattern where what is seen of it makes objects there at least 8 times less likely."""
+"""A line of cells ends the pattern where what is seen of it says, 8 to 1, that no objects are there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,8 +106,9 @@ def continued(
 ) -> Continued:
     """The objects that continue `laid` over a `hole` [H, W] of the photo, and on a `canvas` around it.
 
-    `photo` is flat, as `laid` is; what is not valid of it is unknown as well. The canvas is a box in the photo's
-    pixels, without it the photo. Objects come in where their cells have a part in the hole or beyond the frame.
+    `photo` is flat, as `laid` is; what is not valid of it is unknown as well. The canvas is a box in the
+    photo's pixels, without it the photo. Objects come in where their cells have a part in the hole or beyond
+    the frame.
     """
     frame = (-0.5, -0.5, laid.size.width - 0.5, laid.size.height - 0.5)
     view = _View(laid, photo.valid, np.zeros_like(photo.valid) if hole is None else hole, canvas or frame)
@@ -175,7 +176,8 @@ def _moved(bounds: tuple[Bound, ...], index: Index, bits: Array, seen: Mask) -> 
     """The bounds moved outwards over undrawn cells [K, 2], as far as what is seen does not speak against.
 
     Half a line of cells wholly `seen` [K] is as the program has it: whoever wrote it saw that no objects are
-    there. Of others what there is counts, by its `bits` [K]. Each bound in turn given the others, until none moves.
+    there. Of others what there is counts, by its `bits` [K]. Each bound in turn given the others, until none
+    moves.
     """
     found = list(bounds)
     moved = True
@@ -214,13 +216,14 @@ def _shown(view: _View, index: Index) -> _Shown:
     height, width = view.valid.shape
     at = np.where(front[..., None], at, -1e9)
     pixel = np.rint(at)
-    in_frame = (pixel >= 0).all(-1) & (pixel <= np.array([width - 1, height - 1])).all(-1)
+    in_frame: Mask = np.asarray((pixel >= 0).all(-1) & (pixel <= np.array([width - 1, height - 1])).all(-1))
     columns, rows = np.moveaxis(np.where(in_frame[..., None], pixel, 0).astype(np.int64), -1, 0)
     in_hole = in_frame & view.hole[rows, columns]
     seen = in_frame & view.valid[rows, columns] & ~in_hole
     on_canvas = (at >= np.array(view.canvas[:2])).all(-1) & (at <= np.array(view.canvas[2:])).all(-1)
     asked = in_hole | (on_canvas & ~in_frame)
-    return _Shown(seen.mean((1, 2)), asked.mean((1, 2)), large & (in_frame | on_canvas).any((1, 2)))
+    shares = [one.mean((1, 2)) for one in (seen, asked, in_frame | on_canvas)]
+    return _Shown(shares[0], shares[1], large & (shares[2] > 0))
 
 
 def _around(view: _View) -> Index:

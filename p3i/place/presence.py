@@ -69,8 +69,8 @@ def presence_of(laid: Placed, photo: Image, index: np.ndarray) -> Array:
 def bits_of(laid: Placed, photo: Image, asked: np.ndarray) -> Array | None:
     """The bits [K] that the photo says for an object at each (i, j) of `asked` [K, 2], drawn or not.
 
-    0 where nothing is known of it; None where there is no telling at all. What an object looks like is told by
-    those that `laid` draws; `photo` is flat, as `laid` is.
+    0 where nothing is known of it; None where there is no telling at all. What an object looks like is told
+    by those that `laid` draws; `photo` is flat, as `laid` is.
     """
     inside = laid.in_sight()
     found = _read(laid, photo, laid.index[inside], asked)
@@ -81,10 +81,10 @@ def bits_of(laid: Placed, photo: Image, asked: np.ndarray) -> Array | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
-    """What cells side by side say: their `bits`, None where there is nothing to see; which are `drawn` [R, C].
+    """What cells side by side say: their `bits`, None where there is nothing to see.
 
-    `place` [K] is where those asked for stand, `seen` [K] whether the photo shows them at all; `enough` of the
-    drawn ones can be judged.
+    `drawn` [R, C] are 1 where objects are; `place` [K] is where those asked for stand, `seen` [K] whether the
+    photo shows them at all; `enough` of the drawn ones can be judged.
     """
 
     bits: CellBits | None
