@@ -25,7 +25,7 @@ from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
 from p3i.grammar.printer import format_program
 from p3i.options.extend import SIDES, Beyond, ExtendOptions
-from p3i.paint.edit.margins import Sides, grown, kept_sides, margins_px, refuse_horizon
+from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.continued import Continued, continued, widened
@@ -132,7 +132,8 @@ def extend(
     if flat.k1 is not None:
         notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
     laid = dataclasses.replace(placed(program, photo, focal_mm=asked.focal_mm), lens_k1=None)
-    sides = margins_px(laid, asked.by)
+    wanted = margins_px(laid, asked.by)
+    sides = before_horizon(laid, wanted) if asked.beyond == "crop" else wanted
     left, top, right, bottom = sides
     size = Size(photo.size.width + left + right, photo.size.height + top + bottom)
     if size.width * size.height > asked.max_px:
@@ -157,7 +158,8 @@ def extend(
         known, shown, bare = (one[window] for one in (known, shown, bare))
         more = _on_canvas(more, laid, kept)
         wide = _wider(more.joined(laid), kept, grown(photo.size, kept))
-        notes += _cropped_note(sides, kept)
+    if kept != wanted:
+        notes += _cropped_note(wanted, kept)
     smooth = float(bare.sum() / max(1, (~shown).sum()))
     if asked.beyond == "refuse" and smooth >= _LEAST_TOLD:
         raise UsageError(

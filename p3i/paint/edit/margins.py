@@ -67,27 +67,47 @@ def _cells_px(laid: Placed, side: int, count: float) -> int:
     return math.ceil(far)
 
 
+def before_horizon(laid: Placed, sides: Sides) -> Sides:
+    """The sides, less where a photo that shows the plane only would come to show its horizon."""
+    line = laid.camera.horizon(laid.size)
+    if line is None or _to_horizon(line, laid.size, (0, 0, 0, 0)) <= _least_px(laid.size):
+        return sides  # without one, or the photo itself shows it: beyond it nothing is pattern
+    found = list(sides)
+    towards = {0: line[0], 1: line[1], 2: -line[0], 3: -line[1]}
+    for side in sorted(towards, key=lambda one: towards[one], reverse=True)[:2]:
+        fits, over = 0, found[side] + 1
+        while over - fits > 1:
+            found[side] = (fits + over) // 2
+            far = _to_horizon(line, laid.size, (found[0], found[1], found[2], found[3]))
+            fits, over = (found[side], over) if far > _least_px(laid.size) else (fits, found[side])
+        found[side] = fits
+    return found[0], found[1], found[2], found[3]
+
+
 def refuse_horizon(laid: Placed, sides: Sides) -> None:
     """Raises UsageError where a side that shows the plane only would come to show the horizon."""
+    kept = before_horizon(laid, sides)
+    if kept == sides:
+        return
+    guilty = SIDES[next(number for number in range(4) if kept[number] < sides[number])]
     line = laid.camera.horizon(laid.size)
-    if line is None:
-        return
-    a, b, c = line
-    width, height = laid.size.width, laid.size.height
-    least = _LEAST_TO_HORIZON * laid.size.longer
-    corners = [(x, y) for x in (-0.5, width - 0.5) for y in (-0.5, height - 0.5)]
-    nearest = min(a * x + b * y + c for x, y in corners)
-    if nearest <= least:
-        return  # the photo itself shows the horizon: beyond it nothing is pattern
-    left, top, right, bottom = sides
-    wide = [(x, y) for x in (-left - 0.5, width + right - 0.5) for y in (-top - 0.5, height + bottom - 0.5)]
-    if min(a * x + b * y + c for x, y in wide) > least:
-        return
-    guilty = "top" if b > abs(a) else "bottom" if -b > abs(a) else "left" if a > 0 else "right"
+    nearest = 0.0 if line is None else _to_horizon(line, laid.size, (0, 0, 0, 0))
     raise UsageError(
-        f"the plane's horizon lies {max(0, nearest):.0f} pixels beyond the photo, and the new picture would "
+        f"the plane's horizon lies {nearest:.0f} pixels beyond the photo, and the new picture would "
         f"reach it: let the {guilty} side grow by less"
     )
+
+
+def _to_horizon(line: tuple[float, float, float], size: Size, sides: Sides) -> float:
+    """How far the nearest corner of a picture that has grown lies before the horizon, in pixels."""
+    a, b, c = line
+    left, top, right, bottom = sides
+    xs, ys = (-left - 0.5, size.width + right - 0.5), (-top - 0.5, size.height + bottom - 0.5)
+    return min(a * x + b * y + c for x in xs for y in ys)
+
+
+def _least_px(size: Size) -> float:
+    return _LEAST_TO_HORIZON * size.longer
 
 
 def kept_sides(bare: Mask, sides: Sides, size: Size) -> Sides:
