@@ -120,12 +120,15 @@ def continued(
     shown = _shown(view, index)
     if not shown.asked.any():
         return Continued(np.zeros((0, 2), np.int64), np.zeros((0, 2)), bounds)
-    told = bits_of(laid, masked(photo, view.hole), index[shown.seen > 0]) if shown.seen.any() else None
-    bits = np.zeros(len(index))
-    if told is not None:
-        bits[shown.seen > 0] = told
-    bounds = _moved(bounds, index, bits, shown.seen > 1 - 1e-9)
-    index = index[_inside(index, bounds) & (shown.asked > 0)]
+    whole, bits = shown.seen > 1 - 1e-9, np.zeros(len(index))
+    # What is seen is looked at only where the pattern could go on at all: near a horizon cells are many.
+    free = _inside(index, _moved(bounds, index, bits, whole))
+    told = free & (shown.seen > 0)
+    found = bits_of(laid, masked(photo, view.hole), index[told]) if told.any() else None
+    if found is not None:
+        bits[told] = found
+    bounds = _moved(bounds, index, bits, whole)
+    index = index[free & _inside(index, bounds) & (shown.asked > 0)]
     points = laid.at(index)
     _, first = np.unique(np.rint(points * 1e3), axis=0, return_index=True)  # turns that coincide are one
     first = np.sort(first)
