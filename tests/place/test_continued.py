@@ -136,7 +136,7 @@ def test_an_arc_that_is_seen_to_end_under_a_hole_near_by_ends_there() -> None:
 
 
 def test_beyond_the_frame_nothing_goes_on_that_ends_inside_the_photo() -> None:
-    """The lower left corner is near the frame, so that most of the row below lies beyond it, as on a terrace."""
+    """The lower corners are near the frame: most of the row below lies beyond it, as on a terrace."""
     text = RECTANGLE.replace("range(-4, 5)", "range(-5, 1)").replace("range(-3, 4)", "range(-2, 3)")
     photo = drawn(text)
     laid = laid_on(photo, text)

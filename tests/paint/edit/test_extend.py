@@ -141,29 +141,6 @@ def test_a_side_where_the_pattern_ends_is_cropped_and_the_others_grow() -> None:
     assert len(new) and new[:, 1].min() >= -3
 
 
-def test_light_is_taken_from_the_pattern_alone() -> None:
-    """Beside the pattern the ground is green up to the frame; what is added below must not be tinted."""
-    text = ENDLESS.replace("range(-14, 15)", "range(-2, 3)")
-    photo = drawn(text)
-    laid = placed(loads(text), photo)
-    away = np.abs(laid.centers_px()[0][:, 0][laid.in_sight()] - 240).max() + 30
-    columns = np.arange(photo.size.width)
-    green = np.abs(columns - 240) > away
-    assert green.sum() > 60
-    pixels = photo.pixels.copy()
-    pixels[:, green] = (0.1, 0.5, 0.1)
-    given = dataclasses.replace(photo, pixels=pixels)
-    part = loads(text.replace("range(-10, 11)", "range(-5, 4)"))
-    plain, tinted = (
-        extend(one, part, by=Margins(0, 0, 0, 40), beyond="transparent") for one in (photo, given)
-    )
-    assert plain.alpha is not None and tinted.alpha is not None
-    new = (tinted.alpha > 0) & (plain.alpha > 0)
-    new[: photo.size.height] = False
-    assert new.sum() > 1000
-    assert np.abs(plain.pixels - tinted.pixels)[new].mean() * 255 < 1
-
-
 def test_the_new_program_draws_on_the_new_picture_where_the_old_one_does() -> None:
     given = cropped(drawn(ENDLESS))
     found = extend(given, on_crop(PART), by=Margins(8, 4, 8, 4), focal_mm=FOCAL)
