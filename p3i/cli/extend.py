@@ -23,7 +23,7 @@ from p3i.options.extend import ExtendOptions, Margins, parse_margins
         metavar="N|L,T,R,B",
         help="How many more cells to each side, counted at the sides' middles.",
     ),
-    options.of(ExtendOptions, "max_px", "focal_mm"),
+    options.of(ExtendOptions, "beyond", "max_px", "focal_mm"),
 )
 @targets.written(PICTURES, "Where to write the picture.")
 @options.quiet
@@ -32,8 +32,8 @@ from p3i.options.extend import ExtendOptions, Margins, parse_margins
 def command(**given: Any) -> int:
     """Continue PHOTO beyond its frame: where the frame cuts the pattern of PROG, the pattern goes on.
 
-    The photo's own pixels stay as they are, to the bit. Where the pattern ends inside the photo nothing of it
-    is added; what is not pattern is continued smoothly. Without PROG the program is searched for.
+    The photo's own pixels stay as they are, to the bit. The picture grows where the pattern does; --beyond
+    says what becomes of ground that is not pattern. Without PROG the program is searched for.
     """
     if given["by"] is not None and given["cells"] is not None:
         raise UsageError("--by and --cells both say how far: give one of them")

@@ -6,7 +6,7 @@ Imports neither torch nor numpy: `p3i extend --help` reads this file.
 import math
 import re
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
 from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
@@ -15,6 +15,10 @@ SIDES = ("left", "top", "right", "bottom")
 """The sides of a picture, in the order in which margins are given."""
 
 Unit = Literal["px", "%", "cells"]
+
+Beyond = Literal["crop", "transparent", "continue", "refuse"]
+BEYONDS: tuple[Beyond, ...] = get_args(Beyond)
+"""What becomes of new ground that is not pattern."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +77,20 @@ class ExtendOptions:
         "are of the width (left, right) and of the height (top, bottom). [default: 20%]",
         Spelt(metavar="N%|N|L,T,R,B", read=parse_margins),
     ] = Margins(20, 20, 20, 20, "%")
+    beyond: Annotated[
+        Beyond,
+        "Where the new ground is not pattern. crop: grow only as far as it is; transparent: leave it so; "
+        "continue: the photo's border goes on, smoothly; refuse: make no such picture.",
+    ] = "crop"
     max_px: Annotated[
         int, "Make no picture of more than N pixels (width times height).", Spelt(metavar="N")
     ] = 100_000_000
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:
+        if self.beyond not in BEYONDS:
+            raise UsageError(
+                f"what is not pattern is left by one of {', '.join(BEYONDS)}, not by {self.beyond!r}"
+            )
         check_max_px(self.max_px)
         check_focal(self.focal_mm)

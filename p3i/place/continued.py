@@ -1,8 +1,10 @@
-"""A program continued beyond the frame of its photo: which more objects a wider picture would show.
+"""A program continued over unknown ground: which more objects there are where the photo shows nothing.
 
-Loops and guards bound (i, j) by straight lines. Where the photo's frame lies in the way of the next object
-beyond such a bound, nothing is known of the pattern's end, and it goes on; where the next object would lie
-on the photo, the pattern ends there, and goes on nowhere beyond that bound.
+Unknown is what lies beyond the frame and what is hidden in the photo: holes, what is transparent or masked.
+Loops and guards bound (i, j) by straight lines. Beyond each such bound the pattern goes on line by line, as
+long as what the photo shows of the next line does not speak against it: a line that is hidden or cut off
+wholly says nothing, and one that is seen in part says what that part shows. So an outline that is seen beside
+a hole goes straight on through it, and one that ends where the hole begins does not.
 
 Convention: pixels of the photo; boxes in them are (left, top, right, bottom), their edges included.
 """
@@ -15,8 +17,11 @@ from numpy.typing import NDArray
 
 from p3i.grammar.ast import Affine, For, Polar, Program, Statement
 from p3i.interp.unroll import SLACK, Nest, nest
-from p3i.place.outlines import Chart, chart_of, polygons
+from p3i.place.moves import nearest
+from p3i.place.outlines import chart_of
 from p3i.place.placed import Placed
+from p3i.place.presence import bits_of
+from p3i.vision.image import Image, masked
 from p3i.vision.sheet import project
 
 Array = NDArray[np.float64]
@@ -29,62 +34,105 @@ _STEP = 4
 _MOST = 40_000
 # Cells smaller than this are too near to the horizon to be painted.
 _LEAST_PX = 4.0
-# A bound is the frame's doing where the frame cuts this share of the cells next to it.
-_CUT = 0.5
-# Of a cell, this much may lie beyond the frame before the frame is said to cut it.
-_SLACK_PX = 1.0
+# A cell is looked at in so many places a side.
+_LOOKS = 7
+# A line of cells is as the program has it where the photo shows this share of them wholly.
+_SEEN = 0.5
 # Rings whose step divides 360 up to this are closed.
 _TURN_SLACK = 0.1
+
+AGAINST_BITS = 3.0
+"""A line of cells ends the pattern where what is seen of it says, 8 to 1, that no objects are there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bound:
-    """`form` of (i, j) is >= 0 for what is drawn; `open` where the pattern may go on beyond it."""
+    """`form` of (i, j) is >= 0 for what is drawn, and as far as -`reach` for what is continued."""
 
     form: Affine
-    open: bool = False
+    reach: float = 0.0
+
+    def beyond(self, index: Index) -> Array:
+        """How far each (i, j) [K, 2] lies beyond what is drawn: [K], 0 and below where it does not."""
+        form = self.form
+        return -(form.i * index[:, 0] + form.j * index[:, 1] + form.constant)
 
     def holds(self, index: Index) -> Mask:
-        """Which (i, j) [K, 2] lie on the drawn side."""
-        form = self.form
-        return form.i * index[:, 0] + form.j * index[:, 1] + form.constant >= -SLACK
+        """Which (i, j) [K, 2] lie on the side that is drawn or continued."""
+        return self.beyond(index) <= self.reach + SLACK
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Continued:
-    """What goes on: the `index` [K, 2] and `points` [K, 2] that come in addition, and which `bounds` open."""
+    """What goes on: the `index` [K, 2] and `points` [K, 2] that come in addition, and the `bounds` moved."""
 
     index: Index
     points: Array
     bounds: tuple[Bound, ...]
 
+    def joined(self, laid: Placed) -> Placed:
+        """The program with what goes on behind its own objects."""
+        return dataclasses.replace(
+            laid,
+            index=np.concatenate([laid.index, self.index]),
+            points=np.concatenate([laid.points, self.points]),
+        )
 
-def continued(placed: Placed, canvas: Box) -> Continued:
-    """The objects that continue `placed` on `canvas`, a box in the photo's pixels that holds the photo."""
-    chart = chart_of(placed.pattern)
-    parts = nest(placed.pattern.program)
-    frame = (-0.5, -0.5, placed.size.width - 0.5, placed.size.height - 0.5)
-    given = _bounds(parts)
-    found: list[Bound] = []
-    for bound in given:
-        others = [other for other in given if other is not bound]
-        cells = _next_beyond(placed, bound, others, parts)
-        low, high, front = _extents(placed, chart, cells)
-        cut = ~front | _sticks_out(low, high, frame)
-        found.append(dataclasses.replace(bound, open=len(cells) > 0 and bool(cut.mean() >= _CUT)))
-    closed = [bound for bound in found if not bound.open]
-    if len(closed) == len(found):
-        return Continued(np.zeros((0, 2), np.int64), np.zeros((0, 2)), tuple(found))
-    index = _grown(placed, chart, closed, canvas, parts)
-    low, high, front = _extents(placed, chart, index)
-    wanted = front & _touches(low, high, canvas) & _sticks_out(low, high, frame)
-    wanted &= (high - low).min(1) >= _LEAST_PX
-    index = index[wanted]
-    points = placed.at(index)
-    fresh = _fresh(points, placed.points)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """A program on a photo that is `valid` [H, W] with a `hole` [H, W], and the `canvas` around it."""
+
+    laid: Placed
+    valid: Mask
+    hole: Mask
+    canvas: Box
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """Of each cell [K]: the share that the photo shows (`seen`), and that lies where objects are `asked` for.
+
+    `in_sight` [K]: which have a part on photo or canvas and are large enough to be painted.
+    """
+
+    seen: Array
+    asked: Array
+    in_sight: Mask
+
+
+def continued(
+    laid: Placed, photo: Image, *, hole: Mask | None = None, canvas: Box | None = None
+) -> Continued:
+    """The objects that continue `laid` over a `hole` [H, W] of the photo, and on a `canvas` around it.
+
+    `photo` is flat, as `laid` is; what is not valid of it is unknown as well. The canvas is a box in the
+    photo's pixels, without it the photo. Objects come in where their cells have a part in the hole or beyond
+    the frame.
+    """
+    frame = (-0.5, -0.5, laid.size.width - 0.5, laid.size.height - 0.5)
+    view = _View(laid, photo.valid, np.zeros_like(photo.valid) if hole is None else hole, canvas or frame)
+    bounds = tuple(Bound(form) for form in _forms(nest(laid.pattern.program)))
+    index = np.zeros((0, 2), np.int64)
+    if view.hole.any() or view.canvas != frame:
+        index = _around(view)
+        index = index[_fresh(laid, index)]
+    shown = _shown(view, index)
+    if not shown.asked.any():
+        return Continued(np.zeros((0, 2), np.int64), np.zeros((0, 2)), bounds)
+    whole, bits = shown.seen > 1 - 1e-9, np.zeros(len(index))
+    # What is seen is looked at only where the pattern could go on at all: near a horizon cells are many.
+    free = _inside(index, _moved(bounds, index, bits, whole))
+    told = free & (shown.seen > 0)
+    found = bits_of(laid, masked(photo, view.hole), index[told]) if told.any() else None
+    if found is not None:
+        bits[told] = found
+    bounds = _moved(bounds, index, bits, whole)
+    index = index[free & _inside(index, bounds) & (shown.asked > 0)]
+    points = laid.at(index)
     _, first = np.unique(np.rint(points * 1e3), axis=0, return_index=True)  # turns that coincide are one
-    fresh &= np.isin(np.arange(len(points)), first)
-    return Continued(index[fresh], points[fresh], tuple(found))
+    first = np.sort(first)
+    return Continued(index[first], points[first], bounds)
 
 
 def widened(program: Program, index: Index) -> Program | None:
@@ -113,7 +161,7 @@ def widened(program: Program, index: Index) -> Program | None:
     return dataclasses.replace(program, world=change(program.world))
 
 
-def _bounds(parts: Nest) -> list[Bound]:
+def _forms(parts: Nest) -> list[Affine]:
     """What the loops and guards ask of (i, j); a loop's stop is the last number that it reaches."""
     found = [guard.guard for guard in parts.guards]
     for variable, loop in (("i", parts.for_i), ("j", parts.for_j)):
@@ -124,65 +172,88 @@ def _bounds(parts: Nest) -> list[Bound]:
         found.append(Affine(one.i - start.i, one.j - start.j, -start.constant))
         # k < stop is k <= stop - 1 for whole stops, and no worse than a part of a step off for others.
         found.append(Affine(stop.i - one.i, stop.j - one.j, stop.constant - 1))
-    return [Bound(form) for form in found]
+    return found
 
 
-def _next_beyond(placed: Placed, bound: Bound, others: list[Bound], parts: Nest) -> Index:
-    """The (i, j) one step from a drawn object, on the far side of `bound` and of no other."""
-    steps = [(1, 0), (-1, 0)] * (parts.for_i is not None) + [(0, 1), (0, -1)] * (parts.for_j is not None)
-    beside = np.unique(
-        np.concatenate([placed.index + np.array(step, np.int64) for step in steps]), axis=0
-    ).reshape(-1, 2)
-    beside = beside[~bound.holds(beside) & _inside(beside, others)]
-    return beside[_fresh(placed.at(beside), placed.points)] if len(beside) else beside
+def _moved(bounds: tuple[Bound, ...], index: Index, bits: Array, seen: Mask) -> tuple[Bound, ...]:
+    """The bounds moved outwards over undrawn cells [K, 2], as far as what is seen does not speak against.
+
+    Half a line of cells wholly `seen` [K] is as the program has it: whoever wrote it saw that no objects are
+    there. Of others what there is counts, by its `bits` [K]. Each bound in turn given the others, until none
+    moves.
+    """
+    found = list(bounds)
+    moved = True
+    while moved:
+        moved = False
+        for number, bound in enumerate(found):
+            others = (*found[:number], *found[number + 1 :])
+            free = _inside(index, others) & ~bound.holds(index)
+            levels = np.round(bound.beyond(index[free]), 6)
+            reach = bound.reach
+            for level in np.unique(levels):
+                line = levels == level
+                if seen[free][line].mean() >= _SEEN or bits[free][line].sum() <= -AGAINST_BITS:
+                    break
+                reach = float(level)
+            if reach > bound.reach:
+                found[number], moved = dataclasses.replace(bound, reach=reach), True
+    return tuple(found)
 
 
-def _extents(placed: Placed, chart: Chart, index: Index) -> tuple[Array, Array, Mask]:
-    """The boxes of cells on the photo: low and high corners [K, 2], and which lie in front wholly [K]."""
-    if not len(index):
-        return np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, bool)
-    corners = polygons(chart, index)
-    pixels, front = project(placed.image_from_plane, corners)
-    return pixels.min(1), pixels.max(1), np.asarray(front.all(1))
+def _shown(view: _View, index: Index) -> _Shown:
+    """What there is of each cell of `index` [K, 2], looked at in a grid of places."""
+    chart = chart_of(view.laid.pattern)
+    ticks = (np.arange(_LOOKS) + 0.5) / _LOOKS - 0.5
+    place = np.zeros((len(index), _LOOKS, _LOOKS, 4))
+    place[..., :2] = index[:, None, None]
+    place[..., chart.axes] += np.stack(np.meshgrid(ticks, ticks, indexing="ij"), -1)
+    points = chart.at(place.reshape(-1, 4)).reshape(*place.shape[:3], 2)
+    at, front = project(view.laid.image_from_plane, points)
+    steps = [
+        np.linalg.norm(at[:, -1] - at[:, 0], axis=-1),
+        np.linalg.norm(at[:, :, -1] - at[:, :, 0], axis=-1),
+    ]
+    sides = [step.max(1, initial=0) * _LOOKS / (_LOOKS - 1) for step in steps]
+    large = front.all((1, 2)) & (np.minimum(*sides) >= _LEAST_PX)
+    height, width = view.valid.shape
+    at = np.where(front[..., None], at, -1e9)
+    pixel = np.rint(at)
+    in_frame: Mask = np.asarray((pixel >= 0).all(-1) & (pixel <= np.array([width - 1, height - 1])).all(-1))
+    columns, rows = np.moveaxis(np.where(in_frame[..., None], pixel, 0).astype(np.int64), -1, 0)
+    in_hole = in_frame & view.hole[rows, columns]
+    seen = in_frame & view.valid[rows, columns] & ~in_hole
+    on_canvas = (at >= np.array(view.canvas[:2])).all(-1) & (at <= np.array(view.canvas[2:])).all(-1)
+    asked = in_hole | (on_canvas & ~in_frame)
+    shares = [one.mean((1, 2)) for one in (seen, asked, in_frame | on_canvas)]
+    return _Shown(shares[0], shares[1], large & (shares[2] > 0))
 
 
-def _sticks_out(low: Array, high: Array, box: Box) -> Mask:
-    """Which boxes do not lie inside `box` wholly."""
-    return np.asarray(
-        (low < np.array(box[:2]) - _SLACK_PX).any(1) | (high > np.array(box[2:]) + _SLACK_PX).any(1)
-    )
-
-
-def _touches(low: Array, high: Array, box: Box) -> Mask:
-    """Which boxes share a pixel with `box`."""
-    return np.asarray((low <= np.array(box[2:])).all(1) & (high >= np.array(box[:2])).all(1))
-
-
-def _grown(placed: Placed, chart: Chart, closed: list[Bound], canvas: Box, parts: Nest) -> Index:
-    """The (i, j) inside the bounds that stay, in a box that has grown until nothing more is in sight."""
-    low, high = placed.index.min(0), placed.index.max(0)
+def _around(view: _View) -> Index:
+    """All (i, j) with a cell in sight, in a box that has grown until nothing more is."""
+    parts = nest(view.laid.pattern.program)
+    low, high = view.laid.index.min(0), view.laid.index.max(0)
+    drawn = high - low + 1
     axes = [axis for axis, loop in ((0, parts.for_i), (1, parts.for_j)) if loop is not None]
+    room = [[_most_turns(parts, axis) - int(drawn[axis])] * 2 for axis in (0, 1)]  # once round, either way
     grew = True
     while grew and int(np.prod(high - low + 1)) < _MOST:
         grew = False
         for axis in axes:
             unit = (np.arange(2) == axis).astype(np.int64)
-            for end in (-1, 1):
-                room = _most_turns(parts, axis) - int(high[axis] - low[axis] + 1)
-                step = int(min(_STEP, max(0, room))) * unit
-                wider_low, wider_high = (low - step, high) if end < 0 else (low, high + step)
-                slab = _box(wider_low, wider_high)
-                fresh = (slab[:, axis] < low[axis]) | (slab[:, axis] > high[axis])
-                slab = slab[fresh & _inside(slab, closed)]
-                first, last, front = _extents(placed, chart, _sound(slab, parts))
-                seen = front & _touches(first, last, canvas)
-                if (seen & ((last - first).min(1) >= _LEAST_PX)).any():
-                    low, high, grew = np.minimum(low, wider_low), np.maximum(high, wider_high), True
-    index = _box(low, high)
-    return _sound(index[_inside(index, closed)], parts)
+            for end in (0, 1):
+                count = int(min(_STEP, max(0, room[axis][end])))
+                wider = (low - count * unit, high) if end == 0 else (low, high + count * unit)
+                slab = _box(*wider)
+                slab = slab[(slab[:, axis] < low[axis]) | (slab[:, axis] > high[axis])]
+                if _shown(view, _sound(slab, parts)).in_sight.any():
+                    low, high, grew = *wider, True
+                    room[axis][end] -= count
+    index = _sound(_box(low, high), parts)
+    return index[_shown(view, index).in_sight]
 
 
-def _inside(index: Index, bounds: list[Bound]) -> Mask:
+def _inside(index: Index, bounds: tuple[Bound, ...]) -> Mask:
     """Which (i, j) [K, 2] all bounds hold."""
     return np.all([np.ones(len(index), bool), *(bound.holds(index) for bound in bounds)], axis=0)
 
@@ -213,9 +284,7 @@ def _most_turns(parts: Nest, axis: int) -> float:
     return np.inf
 
 
-def _fresh(points: Array, drawn: Array) -> Mask:
-    """Which points [K, 2] no drawn object [M, 2] holds already."""
-    if not len(points):
-        return np.zeros(0, bool)
-    apart = np.abs(points[:, None] - drawn[None]).max(2).min(1)
-    return apart > 1e-3
+def _fresh(laid: Placed, index: Index) -> Mask:
+    """Which (i, j) [K, 2] lie where no drawn object does: rings meet themselves."""
+    points = laid.at(index)
+    return np.asarray(np.abs(points - laid.points[nearest(laid, points)]).max(1) > 1e-3)

@@ -8,7 +8,7 @@ where its place is empty or covered by something else.
 Convention: pixels of the photo, pixel centres at whole numbers; `index` [K, 2] holds (i, j).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,24 +56,60 @@ def presence_of(laid: Placed, photo: Image, index: np.ndarray) -> Array:
     `photo` is flat, as `laid` is (flat.py).
     """
     unknown = np.full(len(index), np.nan)
+    found = _read(laid, photo, index, index)
+    if found is None:
+        return unknown
+    if found.bits is None:  # nothing to see
+        return np.where(found.seen, 0.0, np.nan)
+    halves = _by_halves(found.bits, found.drawn)
+    scores = 1 / (1 + 2.0 ** -np.maximum(found.bits.whole, halves)[found.place])
+    return np.where(found.bits.judged[found.place], scores, np.nan) if found.enough else unknown
+
+
+def bits_of(laid: Placed, photo: Image, asked: np.ndarray) -> Array | None:
+    """The bits [K] that the photo says for an object at each (i, j) of `asked` [K, 2], drawn or not.
+
+    0 where nothing is known of it; None where there is no telling at all. What an object looks like is told
+    by those that `laid` draws; `photo` is flat, as `laid` is.
+    """
+    inside = laid.in_sight()
+    found = _read(laid, photo, laid.index[inside], asked)
+    if found is None or found.bits is None or not found.enough:
+        return None
+    return np.where(found.bits.judged, found.bits.whole, 0.0)[found.place]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Read:
+    """What cells side by side say: their `bits`, None where there is nothing to see.
+
+    `drawn` [R, C] are 1 where objects are; `place` [K] is where those asked for stand, `seen` [K] whether the
+    photo shows them at all; `enough` of the drawn ones can be judged.
+    """
+
+    bits: CellBits | None
+    drawn: Floats
+    place: NDArray[np.int64]
+    seen: Mask
+    enough: bool
+
+
+def _read(laid: Placed, photo: Image, index: np.ndarray, asked: np.ndarray) -> _Read | None:
+    """The cells of the objects `index` [M, 2] and those `asked` [K, 2]; None where they cannot be read."""
     chart = replace(chart_of(laid.pattern), upright=laid.pattern.upright)
     if len(index) < _FEWEST or not chart.directions:
-        return unknown
-    sheet = sheet_of(laid, photo, chart, index)
+        return None
+    sheet = sheet_of(laid, photo, chart, np.concatenate([index, asked]))
     if sheet is None:
-        return unknown
-    place = _position(chart, sheet.box, index)
+        return None
+    own, place = (_position(chart, sheet.box, one) for one in (index, asked))
     drawn = np.zeros(sheet.box.count, np.float32)
-    drawn[place] = 1
+    drawn[own] = 1
     alike = alike_in(sheet, drawn)
-    if alike is None:  # nothing to see
-        seen = cut(sheet.seen, sheet.side).mean(axis=(1, 2))[place] > 0
-        return np.where(seen, 0.0, np.nan)
-    found = cell_bits(alike)
-    if found.judged[place].sum() < _FEWEST:
-        return unknown
-    bits = np.maximum(found.whole, _by_halves(found, drawn.reshape(sheet.box.rows, sheet.box.columns)))
-    return np.where(found.judged, 1 / (1 + 2.0**-bits), np.nan)[place]
+    seen = cut(sheet.seen, sheet.side).mean(axis=(1, 2))[place] > 0
+    bits = None if alike is None else cell_bits(alike)
+    enough = bits is not None and int(bits.judged[own].sum()) >= _FEWEST
+    return _Read(bits, drawn.reshape(sheet.box.rows, sheet.box.columns), place, seen, enough)
 
 
 def _by_halves(found: CellBits, drawn: Floats) -> Array:

@@ -1,7 +1,8 @@
 """A photo continued beyond its frame by its program.
 
-Where the frame cut the pattern, the pattern goes on, filled from the photo's own cells (fill/stack.py); what
-else comes into the picture continues the photo's border smoothly. The camera stays, so its axis meets the
+Where the frame cut the pattern, the pattern goes on, filled from the photo's own cells (fill/stack.py), and
+from these alone: what lies beside the pattern on the photo says nothing of its light. What else would come
+into the picture is cropped away, or is as `beyond` says. The camera stays, so its axis meets the
 new picture where it met the old one: only where opposite sides grow alike that is the middle, and only then
 there is a program that says the same on the new canvas.
 
@@ -10,7 +11,6 @@ picture.
 """
 
 import dataclasses
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -24,7 +24,8 @@ from p3i.errors import UsageError
 from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
 from p3i.grammar.printer import format_program
-from p3i.options.extend import SIDES, ExtendOptions, Margins
+from p3i.options.extend import SIDES, Beyond, ExtendOptions
+from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.continued import Continued, continued, widened
@@ -41,14 +42,13 @@ from p3i.vision.sheet import project
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Progress = Callable[[str, float], None]
-Sides = tuple[int, int, int, int]
 
-# The horizon stays this far from the new picture, as a share of the photo's longer side.
-_LEAST_TO_HORIZON = 0.02
 # A new picture has many pieces: fewer objects are tried for each than for a hole.
 _MOST_TRIED = 24
 # Objects that differ from one another by more than this share of their own contrast give ghosts.
 _MOST_UNLIKE = 0.8
+# A smaller share of the new pixels is not worth a word.
+_LEAST_TOLD = 0.01
 # Pieces that nothing in the photo was like are tried again beside those that were filled.
 _ROUNDS = 3
 
@@ -57,11 +57,13 @@ _ROUNDS = 3
 class Extended:
     """A photo continued by `margins` (left, top, right, bottom) pixels: `pixels` float32 [H, W, 3].
 
-    `alpha` [H, W] is what was transparent in the photo, None where nothing was.
+    `alpha` [H, W] is what is transparent: what was so in the photo, and what is no pattern where that was
+    asked for; None where nothing is.
 
     `laid` is the program on the new canvas with the objects that were added, the last `added` of them;
     `smooth` is the share of the new pixels that no object's cell covers, or for which no cell was like
-    enough: there the border is continued. `program` draws the same on the new canvas, None where none does.
+    enough: there the border is continued, or nothing is (`beyond`). `program` draws the same on the new
+    canvas, None where none does.
     """
 
     photo: Image
@@ -130,121 +132,84 @@ def extend(
     if flat.k1 is not None:
         notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
     laid = dataclasses.replace(placed(program, photo, focal_mm=asked.focal_mm), lens_k1=None)
-    sides = margins_px(laid, asked.by)
+    wanted = margins_px(laid, asked.by)
+    sides = before_horizon(laid, wanted) if asked.beyond == "crop" else wanted
     left, top, right, bottom = sides
     size = Size(photo.size.width + left + right, photo.size.height + top + bottom)
     if size.width * size.height > asked.max_px:
         raise UsageError(
             f"the picture would have {size.width} x {size.height} pixels, more than --max-px {asked.max_px:,}"
         )
-    _refuse_horizon(laid, sides)
-    more = continued(laid, (-left - 0.5, -top - 0.5, size.width - left - 0.5, size.height - top - 0.5))
-    wide = _wider(laid, more, sides, size)
+    refuse_horizon(laid, sides)
+    x, y = flat.corner[0] - left - 0.5, flat.corner[1] - top - 0.5
+    canvas = (x, y, x + size.width, y + size.height)
+    more = continued(flat.placed, flat.photo, hole=~flat.seen, canvas=canvas)
+    wide = _wider(more.joined(laid), sides, size)
 
     pixels, known, shown = _laid_out(flat, sides, size)
-    alpha = _alpha(photo, known, shown, sides) if flat.k1 is None else _alpha(None, known, shown, sides)
-    hole = ~shown
-    pattern = hole & _ground(wide)
-    bare = hole & ~pattern
-    left_over = pattern
-    for _ in range(_ROUNDS):
-        if not left_over.any():
-            break
-        pixels, unlike = fill_by_stack(
-            pixels, known | (pattern & ~left_over), left_over, wide, most_tried=_MOST_TRIED, progress=progress
+    ground = _ground(wide)
+    pixels, bare = _painted(pixels, known & ground, ~shown & ground, wide, progress)
+    bare |= ~shown & ~ground
+    kept = kept_sides(bare, sides, size) if asked.beyond == "crop" else sides
+    if kept != sides:
+        off = (sides[0] - kept[0], sides[1] - kept[1], sides[2] - kept[2], sides[3] - kept[3])
+        window = _window(off, grown(photo.size, kept))
+        pixels = pixels[window].copy()
+        known, shown, bare = (one[window] for one in (known, shown, bare))
+        more = _on_canvas(more, laid, kept)
+        wide = _wider(more.joined(laid), kept, grown(photo.size, kept))
+    if kept != wanted:
+        notes += _cropped_note(wanted, kept)
+    smooth = float(bare.sum() / max(1, (~shown).sum()))
+    if asked.beyond == "refuse" and smooth >= _LEAST_TOLD:
+        raise UsageError(
+            f"{smooth:.0%} of the new pixels would not be pattern: grow by less, or choose another --beyond"
         )
-        if unlike.sum() == left_over.sum():
-            break
-        left_over = unlike
-    bare |= left_over
+    alpha = _alpha(photo if flat.k1 is None else None, known, shown, kept)
+    if asked.beyond == "transparent" and bare.any():
+        alpha = np.where(bare, np.float32(0), np.float32(1) if alpha is None else alpha)
     if bare.any():
-        fill_in(pixels, (known | hole) & ~bare, bare)
-    smooth = float(bare.sum() / max(1, hole.sum()))
-    wider = _program(program, wide, more, sides, laid.size)
-    notes += _notes(smooth, more, wider, sides)
+        fill_in(pixels, (known | ~shown) & ~bare, bare)
+    wider = _program(program, wide, more, kept, laid.size)
+    notes += _notes(smooth, more, wider, kept, asked.beyond)
     if len(more.index) and cutout(flat.placed, flat.photo).unlike > _MOST_UNLIKE:
         notes.append(
             "look at what was added: the photo's objects differ much from one another, and mixtures of them "
             "look like ghosts"
         )
-    return Extended(photo, pixels, alpha, sides, wide, len(more.index), smooth, wider, tuple(notes))
+    return Extended(photo, pixels, alpha, kept, wide, len(more.index), smooth, wider, tuple(notes))
 
 
-def margins_px(laid: Placed, by: Margins) -> Sides:
-    """How many pixels each side grows by; UsageError where cells reach the horizon, or for nothing."""
-    width, height = laid.size.width, laid.size.height
-    if by.unit == "cells":
-        found = [_cells_px(laid, side, count) if count else 0 for side, count in enumerate(by.sides)]
-    else:
-        share = (width / 100, height / 100) * 2 if by.unit == "%" else (1.0,) * 4
-        found = [round(one * part) for one, part in zip(by.sides, share, strict=True)]
-    if not any(found):
-        raise UsageError("the picture would grow by less than a pixel: ask for more")
-    left, top, right, bottom = found
-    return left, top, right, bottom
+def _painted(
+    pixels: Floats, known: Mask, hole: Mask, wide: Placed, progress: Progress | None
+) -> tuple[Floats, Mask]:
+    """The hole filled from what is known of the pattern, and where nothing is like it [H, W]."""
+    left_over = hole
+    for _ in range(_ROUNDS):
+        if not left_over.any():
+            break
+        pixels, unlike = fill_by_stack(
+            pixels, known | (hole & ~left_over), left_over, wide, most_tried=_MOST_TRIED, progress=progress
+        )
+        if unlike.sum() == left_over.sum():
+            break
+        left_over = unlike
+    return pixels, left_over
 
 
-def _cells_px(laid: Placed, side: int, count: float) -> int:
-    """How far `count` cells reach beyond the middle of a side, along the lattice's likest direction."""
-    width, height = laid.size.width, laid.size.height
-    middle = np.array(
-        [(-0.5, (height - 1) / 2), ((width - 1) / 2, -0.5), (width - 0.5, (height - 1) / 2),
-         ((width - 1) / 2, height - 0.5)][side]
-    )  # fmt: skip
-    outwards = np.array([(-1, 0), (0, -1), (1, 0), (0, 1)][side])
-    start, front = project(np.linalg.inv(laid.image_from_plane), middle[None])
-    if not front[0]:
-        raise UsageError(f"the {SIDES[side]} side of the photo lies beyond the horizon: no cell is there")
-    near = laid.index[np.argmin(np.hypot(*(laid.points - start[0]).T))].astype(float)
-    moves = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
-    steps = laid.at(near + moves / 2) - laid.at(near - moves / 2)
-    if np.linalg.norm(steps, axis=1).min() < 1e-6:  # a single row: as far across as along
-        longest = steps[np.argmax(np.linalg.norm(steps, axis=1))]
-        across = np.array([-longest[1], longest[0]])
-        steps = np.array([longest, -longest, across, -across])
-    tiny, _ = project(laid.image_from_plane, start + 0.01 * steps)
-    directions = tiny - middle
-    likest = int(np.argmax(directions @ outwards / np.linalg.norm(directions, axis=1)))
-    end, front = project(laid.image_from_plane, start + count * steps[likest])
-    far = float((end[0] - middle) @ outwards)
-    if not front[0] or far <= 0:
-        raise UsageError(f"{count:g} more cells to the {SIDES[side]} reach the horizon: ask for fewer")
-    return math.ceil(far)
+def _on_canvas(more: Continued, laid: Placed, sides: Sides) -> Continued:
+    """Those of the objects that came in of whose cells a part lies on a canvas that was cropped."""
+    cells, _ = project(laid.image_from_plane, polygons(chart_of(laid.pattern), more.index))
+    size = grown(laid.size, sides)
+    low, high = -np.array(sides[:2]) - 0.5, np.array([size.width, size.height]) - np.array(sides[:2]) - 0.5
+    on = (cells.min(1) < high).all(1) & (cells.max(1) > low).all(1)
+    return dataclasses.replace(more, index=more.index[on], points=more.points[on])
 
 
-def _refuse_horizon(laid: Placed, sides: Sides) -> None:
-    """UsageError where a side that shows the plane only would come to show the horizon."""
-    line = laid.camera.horizon(laid.size)
-    if line is None:
-        return
-    a, b, c = line
-    width, height = laid.size.width, laid.size.height
-    least = _LEAST_TO_HORIZON * laid.size.longer
-    corners = [(x, y) for x in (-0.5, width - 0.5) for y in (-0.5, height - 0.5)]
-    nearest = min(a * x + b * y + c for x, y in corners)
-    if nearest <= least:
-        return  # the photo itself shows the horizon: beyond it nothing is pattern
-    left, top, right, bottom = sides
-    wide = [(x, y) for x in (-left - 0.5, width + right - 0.5) for y in (-top - 0.5, height + bottom - 0.5)]
-    if min(a * x + b * y + c for x, y in wide) > least:
-        return
-    guilty = "top" if b > abs(a) else "bottom" if -b > abs(a) else "left" if a > 0 else "right"
-    raise UsageError(
-        f"the plane's horizon lies {max(0, nearest):.0f} pixels beyond the photo, and the new picture would "
-        f"reach it: let the {guilty} side grow by less"
-    )
-
-
-def _wider(laid: Placed, more: Continued, sides: Sides, size: Size) -> Placed:
-    """The program on the new canvas, with the objects that were added behind its own."""
+def _wider(laid: Placed, sides: Sides, size: Size) -> Placed:
+    """The program on the new canvas."""
     shift = np.array([[1.0, 0, sides[0]], [0, 1, sides[1]], [0, 0, 1]])
-    return dataclasses.replace(
-        laid,
-        size=size,
-        image_from_plane=shift @ laid.image_from_plane,
-        index=np.concatenate([laid.index, more.index]),
-        points=np.concatenate([laid.points, more.points]),
-    )
+    return dataclasses.replace(laid, size=size, image_from_plane=shift @ laid.image_from_plane)
 
 
 def _ground(wide: Placed) -> Mask:
@@ -325,16 +290,25 @@ def _program(program: Program, wide: Placed, more: Continued, sides: Sides, old:
     return map_affines(dataclasses.replace(drawn, header=header), change)
 
 
-def _notes(smooth: float, more: Continued, wider: Program | None, sides: Sides) -> list[str]:
+def _cropped_note(asked: Sides, kept: Sides) -> list[str]:
+    """What was asked for and was cropped, side by side."""
+    cut = [
+        f"{name} by {new} of {old}" for name, old, new in zip(SIDES, asked, kept, strict=True) if new < old
+    ]
+    return [f"grown only as far as the pattern goes ({', '.join(cut)} pixels): --beyond says what else to do"]
+
+
+def _notes(smooth: float, more: Continued, wider: Program | None, sides: Sides, beyond: Beyond) -> list[str]:
     found: list[str] = []
     if not len(more.index):
         found.append(
             "the pattern ends inside the photo, or does not reach its new border: nothing of it is added"
         )
-    if smooth >= 0.01:
-        found.append(
-            f"{smooth:.0%} of the new pixels are not pattern: the photo's border is continued smoothly"
+    if smooth >= _LEAST_TOLD:
+        what = (
+            "they are transparent" if beyond == "transparent" else "the photo's border is continued smoothly"
         )
+        found.append(f"{smooth:.0%} of the new pixels are not pattern: {what}")
     if wider is None:
         why = (
             "its guards or leaning bounds would have to change"

@@ -21,6 +21,7 @@ from p3i.options.inpaint import InpaintOptions
 from p3i.options.points import PointsOptions
 from p3i.paint.fill.filled import Filled, share_text
 from p3i.paint.fill.stack import fill_by_stack
+from p3i.place.continued import continued
 from p3i.place.flat import flat_of
 from p3i.place.objects import objects_of
 from p3i.place.placed import Placed, placed
@@ -41,7 +42,8 @@ class Inpainted:
     """A photo with its `hole` [H, W] filled by `method`: `pixels` float32 [H, W, 3].
 
     `unlike` is the share of the hole for which the program knows nothing like it; `fallback` the share that
-    something simpler than the method filled, that one included. `notes` are sentences for the user.
+    something simpler than the method filled, that one included. `added` are the (i, j) with which the pattern
+    goes on through the hole beyond what the program draws. `notes` are sentences for the user.
     """
 
     photo: Image
@@ -51,6 +53,7 @@ class Inpainted:
     unlike: float
     fallback: float
     notes: tuple[str, ...] = ()
+    added: tuple[tuple[int, int], ...] = ()
 
     def paint(self) -> Picture:
         """The picture in the photo's depth; where the hole was transparent it is so no longer."""
@@ -70,6 +73,7 @@ class Inpainted:
             "filled": int(self.hole.sum()),
             "unlike": round(self.unlike, 4),
             "fallback": round(self.fallback, 4),
+            "added": [list(index) for index in self.added],
             "notes": list(self.notes),
         }
 
@@ -171,6 +175,13 @@ def _filled(
     notes: list[str] = []
     if not laid.in_sight().any():
         notes.append("no object of the program lies on the photo: it shows nothing to fill the hole from")
+    more = continued(laid, photo, hole=hole)
+    if len(more.index):
+        notes.append(
+            f"the pattern goes on through the hole: {len(more.index)} "
+            f"{'object is' if len(more.index) == 1 else 'objects are'} added that the program does not draw"
+        )
+        laid = more.joined(laid)
     match options.method:
         case "npn":
             found = _by_network(photo, laid, hole, options, progress)
@@ -186,7 +197,9 @@ def _filled(
             )
             found = Filled(pixels, bare, bare, tuple(said))
     unlike, fallback = (float(part.sum() / hole.sum()) for part in (found.unlike, found.fallback))
-    return Inpainted(photo, found.pixels, hole, options.method, unlike, fallback, (*notes, *found.notes))
+    added = tuple((int(i), int(j)) for i, j in more.index)
+    said = (*notes, *found.notes)
+    return Inpainted(photo, found.pixels, hole, options.method, unlike, fallback, said, added)
 
 
 def _by_network(

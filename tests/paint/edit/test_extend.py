@@ -66,7 +66,7 @@ def test_a_cropped_lattice_gets_back_what_was_cut_off() -> None:
 
 def test_an_arc_that_leaves_the_frame_is_closed_to_its_ring() -> None:
     whole = drawn(LARGE_RING)
-    found = extend(cropped(whole), on_crop(ARC), by=ALL_AROUND, focal_mm=FOCAL)
+    found = extend(cropped(whole), on_crop(ARC), by=ALL_AROUND, focal_mm=FOCAL, beyond="continue")
     assert sorted(found.laid.index[:, 0] % 12) == list(range(12))
     assert np.abs(found.pixels - whole.pixels)[outside(whole)].mean() * 255 < 8
     assert any("not pattern" in note for note in found.notes)
@@ -75,7 +75,11 @@ def test_an_arc_that_leaves_the_frame_is_closed_to_its_ring() -> None:
 def test_a_pattern_that_ends_inside_the_photo_is_not_continued() -> None:
     photo = drawn(LATTICE.replace("range(-4, 5)", "range(-2, 3)").replace("range(-3, 4)", "range(-2, 2)"))
     small = loads(LATTICE.replace("range(-4, 5)", "range(-2, 3)").replace("range(-3, 4)", "range(-2, 2)"))
-    found = extend(photo, small, by=Margins(10, 10, 10, 10, "%"))
+    with pytest.raises(
+        UsageError, match=r"on no side does the pattern go on \(100% of the new ground is none"
+    ):
+        extend(photo, small, by=Margins(10, 10, 10, 10, "%"))
+    found = extend(photo, small, by=Margins(10, 10, 10, 10, "%"), beyond="continue")
     assert found.added == 0
     assert found.smooth == 1
     assert any("nothing of it is added" in note for note in found.notes)
@@ -85,11 +89,56 @@ def test_a_pattern_that_ends_on_one_side_goes_on_at_the_others_only() -> None:
     """Five columns stand in the middle; their rows leave the frame at the top and at the bottom."""
     text = ENDLESS.replace("range(-14, 15)", "range(-2, 3)")
     found = extend(
-        drawn(text), loads(text.replace("range(-10, 11)", "range(-5, 4)")), by=Margins(60, 60, 60, 60)
+        drawn(text),
+        loads(text.replace("range(-10, 11)", "range(-5, 4)")),
+        by=Margins(60, 60, 60, 60),
+        beyond="continue",
     )
     new = found.laid.index[len(found.laid.index) - found.added :]
     assert len(new) >= 5
     assert set(new[:, 0]) <= set(range(-2, 3))
+
+
+# Rows leave the frame at the right; three of them stand in the middle.
+BAND = ENDLESS.replace("range(-10, 11)", "range(-1, 2)").replace("range(-14, 15)", "range(-5, 6)")
+
+
+@pytest.mark.parametrize("beyond", ["crop", "transparent", "continue", "refuse"])
+def test_ground_that_is_not_pattern_is_left_as_asked(beyond: str) -> None:
+    """A band of rows crosses the frame left and right: two thirds of the new ground are none of it."""
+    photo = drawn(BAND.replace("range(-5, 6)", "range(-14, 15)"))
+    asked = {"by": Margins(20, 20, 20, 20), "beyond": beyond}
+    if beyond in ("crop", "refuse"):
+        with pytest.raises(UsageError, match="pattern"):
+            extend(photo, loads(BAND), **asked)
+        return
+    found = extend(photo, loads(BAND), **asked)
+    assert (found.size.width, found.size.height) == (520, 440)
+    assert 0.5 < found.smooth < 1 and found.added
+    clear = 0.0 if found.alpha is None else float((found.alpha == 0).mean())
+    if beyond == "transparent":
+        assert found.alpha is not None and (found.alpha[20:-20, 20:-20] == 1).all()
+        new = 520 * 440 - 480 * 400
+        assert clear * 520 * 440 == pytest.approx(found.smooth * new)
+    else:
+        assert clear == 0
+
+
+def test_a_side_where_the_pattern_ends_is_cropped_and_the_others_grow() -> None:
+    """All of the photo is pattern but for its top: there, and only there, nothing is to be added."""
+    text = ENDLESS.replace("range(-10, 11)", "range(-3, 11)")
+    given = drawn(text)
+    laid = placed(loads(text), given)
+    part = text.replace("range(-14, 15)", "range(-5, 6)").replace("range(-3, 11)", "range(-3, 4)")
+    assert laid.in_sight().sum() > 40
+    found = extend(given, loads(part), by=Margins(0, 30, 0, 30))
+    assert found.margins == (0, 0, 0, 30)
+    assert any("top by 0 of 30" in note for note in found.notes)
+    assert found.size.height == given.size.height + 30
+    assert found.smooth <= 0.1
+    assert np.array_equal(found.pixels[: given.size.height], given.pixels)
+    new = found.laid.index[len(found.laid.index) - found.added :]
+    assert len(new) and new[:, 1].min() >= -3
 
 
 def test_the_new_program_draws_on_the_new_picture_where_the_old_one_does() -> None:
@@ -141,9 +190,9 @@ def test_cells_are_counted_at_the_middle_of_a_side() -> None:
 def test_the_horizon_is_refused_with_the_side_that_meets_it() -> None:
     steep = LATTICE.replace("rx=-30", "rx=-62")
     with pytest.raises(UsageError, match=r"horizon lies .* let the top side grow by less"):
-        extend(drawn(steep), loads(steep), by=Margins(0, 100, 0, 0, "%"))
+        extend(drawn(steep), loads(steep), by=Margins(0, 100, 0, 0, "%"), beyond="continue")
     with pytest.raises(UsageError, match="horizon lies"):
-        extend(drawn(steep), loads(steep), by=Margins(0, 500, 0, 0, "cells"))
+        extend(drawn(steep), loads(steep), by=Margins(0, 500, 0, 0, "cells"), beyond="transparent")
 
 
 @pytest.mark.parametrize(
@@ -219,7 +268,7 @@ def test_the_command_writes_the_picture_and_its_facts(
     write_image(tmp_path / "a.png", drawn(LATTICE).pixels)
     (tmp_path / "a.p3p").write_text(LATTICE)
     words = ["extend", str(tmp_path / "a.png"), str(tmp_path / "a.p3p"), "-o", str(tmp_path / "b.png")]
-    assert run([*words, "--by", "0,0,5%,0", "--json", str(tmp_path / "b.json")]) == 0
+    assert run([*words, "--by", "0,0,5%,0", "--beyond", "continue", "--json", str(tmp_path / "b.json")]) == 0
     assert read_image(tmp_path / "b.png").size.width == 480 + 24
     assert '"right": 24' in (tmp_path / "b.json").read_text()
     assert run([*words, "--by", "5%", "--cells", "1", "--force"]) == 2

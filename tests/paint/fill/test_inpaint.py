@@ -110,9 +110,26 @@ def test_every_method_tells_the_same_facts(method: str) -> None:
     soon = {"time_s": 0.1} if method == "npn" else {}
     found = inpaint(photo, loads(LATTICE), mask=hole, method=method, **soon)
     record = found.record()
-    assert set(record) == {"photo", "method", "filled", "unlike", "fallback", "notes"}
+    assert set(record) == {"photo", "method", "filled", "unlike", "fallback", "added", "notes"}
     assert (record["method"], record["filled"], record["unlike"]) == (method, found.hole.sum(), 0)
     assert record["notes"] == list(found.notes)
+
+
+def test_the_pattern_goes_on_through_a_hole_at_whose_rim_the_program_ends() -> None:
+    """What the search finds with the right third hidden; the pattern is seen to end in its rows only."""
+    photo = drawn(LATTICE)
+    laid = placed(loads(LATTICE), photo)
+    edge = int(laid.centers_px()[0][laid.index[:, 0] == 2][:, 0].min()) - 24
+    hole = np.zeros(photo.valid.shape, bool)
+    hole[:, edge:] = True
+    given = dataclasses.replace(photo, pixels=np.where(hole[:, :, None], np.float32(0), photo.pixels))
+    found = inpaint(given, loads(LATTICE.replace("range(-4, 5)", "range(-4, 2)")), mask=hole)
+    assert {(i, j) for i in range(2, 5) for j in range(-3, 4)} <= set(found.added)
+    assert found.record()["added"] == [list(index) for index in found.added]
+    assert any("goes on through the hole" in note for note in found.notes)
+    cells = hole & (np.arange(480)[None] < laid.centers_px()[0][:, 0].max())
+    assert found.unlike < 0.2, "no smear"
+    assert np.abs(found.pixels - photo.pixels)[cells].mean() * 255 < 14
 
 
 def test_npn_says_where_a_hole_of_many_cells_leaves_it_nothing_to_learn_from() -> None:
