@@ -60,8 +60,13 @@ def drawn_on(placed: Placed) -> NDArray[np.uint8]:
     return cv2.dilate(drawn, np.ones((2 * _SLACK_PX + 1,) * 2, np.uint8))
 
 
-def pieces_of(hole: Mask, drawn: NDArray[np.uint8], placed: Placed) -> tuple[list[Piece], NDArray[np.int32]]:
-    """The pieces, and the number of each pixel's piece [H, W], in the hole and near it; else -1."""
+def pieces_of(
+    hole: Mask, drawn: NDArray[np.uint8], placed: Placed, *, few: float = _FEW
+) -> tuple[list[Piece], NDArray[np.int32]]:
+    """The pieces, and the number of each pixel's piece [H, W], in the hole and near it; else -1.
+
+    What hangs together and is worth so `few` cells is one piece.
+    """
     labels = np.full(hole.shape, -1, np.int32)
     count, parts, boxes, _ = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
     pieces: list[Piece] = []
@@ -71,7 +76,7 @@ def pieces_of(hole: Mask, drawn: NDArray[np.uint8], placed: Placed) -> tuple[lis
         inside = parts[window] == part
         found = 2 * _nearest_in((left, top, right, bottom), placed) + (drawn[window] == 0)
         numbers, counts = np.unique(found[inside], return_counts=True)
-        if _as_many(numbers // 2, counts) <= _FEW:
+        if _as_many(numbers // 2, counts) <= few:
             rows, columns = np.nonzero(inside)
             middle = np.array([[left + columns.mean(), top + rows.mean()]])
             target = int(nearest(placed, project(np.linalg.inv(placed.image_from_plane), middle)[0])[0])
