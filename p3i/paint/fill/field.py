@@ -48,10 +48,12 @@ class Field:
         return found + _averaged(apart, self.width, self.left, self.information, self.towards)
 
 
-def field_of(places: Array, values: Array, information: Array, *, towards: Array, spacing: float) -> Field:
+def field_of(
+    places: Array, values: Array, information: Array, *, towards: Array, spacing: float, finest: float = 0.0
+) -> Field:
     """The field that `values` tell; `towards` [C] is what it is where nothing tells, `spacing` how far the next is.
 
-    Places without information say nothing.
+    Places without information say nothing; no average is narrower than `finest` times the spacing.
     """
     told = np.flatnonzero(np.trace(information, axis1=1, axis2=2) > 0)
     told = told[np.linspace(0, len(told) - 1, min(len(told), _MOST)).astype(int)]
@@ -80,6 +82,8 @@ def field_of(places: Array, values: Array, information: Array, *, towards: Array
     np.fill_diagonal(apart, np.inf)  # each is told by the others
     best, width = float(np.einsum("mc,mcd,md->", left, information, left)), None
     for factor in _WIDTHS:
+        if factor < finest:
+            continue
         off = left - _averaged(apart, factor * spacing, left, information, prior)
         wrong = float(np.einsum("mc,mcd,md->", off, information, off))
         if wrong < best:

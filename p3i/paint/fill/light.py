@@ -61,8 +61,9 @@ def membrane(off: NDArray, rim: NDArray[np.bool_], *, spacing_px: float) -> Floa
 
     0 without a rim; nothing is lifted or lowered by more than `_MOST_CARRIED`.
     """
-    limited = np.clip(off, -_MOST_CARRIED, _MOST_CARRIED).astype(np.float32)
-    return carried(limited * rim[:, :, None], rim.astype(np.float32), spacing_px=spacing_px)
+    limited = np.where(rim[:, :, None], off, 0).astype(np.float32)
+    np.clip(limited, -_MOST_CARRIED, _MOST_CARRIED, out=limited)
+    return carried(limited, rim.astype(np.float32), spacing_px=spacing_px)
 
 
 def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:

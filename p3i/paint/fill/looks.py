@@ -59,7 +59,9 @@ def seam(filled: Floats, known: Mask, hole: Mask, placed: Placed) -> float:
     got, wanted = 0.0, 0.0
     for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         beside = np.roll(own, (-step[1], -step[0]), (0, 1))
-        beside[{(1, 0): np.s_[:, -1], (-1, 0): np.s_[:, 0], (0, 1): np.s_[-1], (0, -1): np.s_[0]}[step]] = False
+        beside[{(1, 0): np.s_[:, -1], (-1, 0): np.s_[:, 0], (0, 1): np.s_[-1], (0, -1): np.s_[0]}[step]] = (
+            False
+        )
         for points, others in _likened(hole & beside, whole, placed, step=step):
             across = np.abs(taken(filled, points) - taken(filled, points + step)).mean(1)
             for at, shown, beyond in others:

@@ -81,7 +81,7 @@ def pieces_of(
             middle = np.array([[left + columns.mean(), top + rows.mean()]])
             target = int(nearest(placed, project(np.linalg.inv(placed.image_from_plane), middle)[0])[0])
             found[:] = 0
-            kinds = {0: (target, False, bool((numbers % 2 == 1).all()))}
+            kinds = {0: (target, False, False)}
         else:
             kinds = {number: (number // 2, number % 2 == 0, number % 2 == 1) for number in numbers.tolist()}
         # What lies near two holes is the nearer's: of its own pixels, else of the first.

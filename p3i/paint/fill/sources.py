@@ -158,9 +158,7 @@ class Source:
         return colours, known
 
 
-def hole_of(
-    points: Array, shown: Floats, known: Mask, placed: Placed, *, target: int | None = None
-) -> Hole:
+def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed, *, target: int | None = None) -> Hole:
     """A piece of the hole, its pixels [L, 2], with its surroundings: what is `known` [H, W] of `shown`.
 
     It is seen from the object `target`, without one from that nearest to its middle.
@@ -198,21 +196,26 @@ def sources(
     most: int = MOST_TRIED,
     kept: int = _MOST_KEPT,
     survey: Survey | None = None,
+    allowed: NDArray[np.uint8] | None = None,
 ) -> list[Source]:
     """The sources of a hole among the `most` nearest objects, the likest first, so many as are `kept`.
 
     What the hole's surroundings do not tell of light, shift and likeness, the `survey` does; without either
     there are none, as where the program draws nothing like the hole in sight. Where none of those kept shows a
-    part of the hole, further ones do.
+    part of the hole, further ones do. What they show lies on `allowed` ground, 1 [H, W]; without it those that
+    would bring in ground where nothing is drawn are left out.
     """
     if not len(hole.around) and survey is None:
         return []
     asked = hole.points[:: max(1, len(hole.points) // _PROBES)]
     misfits = np.full(len(placed.points), np.inf) if survey is None else survey.misfits(hole.target)
     found: list[tuple[float, int, Array, float, Mask]] = []
-    for number, matrix in _laid_on(hole, ground, placed, most=most, survey=survey):
+    for number, matrix in _laid_on(hole, ground, placed, most=most, survey=survey, checked=allowed is None):
         at, front = project(matrix, asked)
         shown = front & ground.known(at)
+        if allowed is not None:
+            columns, rows = np.rint(np.clip(at, 0, np.array(allowed.shape[::-1]) - 1)).astype(int).T
+            shown &= allowed[rows, columns] > 0
         if shown.mean() < _LEAST_OF_HOLE:
             continue
         expected = _expected_misfit(hole, matrix, float(misfits[number]))
@@ -261,7 +264,7 @@ def laid_on(hole: Hole, ground: Ground, placed: Placed, *, most: int) -> Iterato
 
 
 def _laid_on(
-    hole: Hole, ground: Ground, placed: Placed, *, most: int, survey: Survey | None
+    hole: Hole, ground: Ground, placed: Placed, *, most: int, survey: Survey | None, checked: bool = True
 ) -> Iterator[tuple[int, Array]]:
     """The objects and matrices of `laid_on`, with the shift that a survey tells."""
     pixels, _ = placed.centers_px()
@@ -278,7 +281,7 @@ def _laid_on(
     probes = hole.points[:: max(1, len(hole.points) // _PROBES)]
     probes, _ = project(plane_from_image, probes)
     spacing = _spacing(placed, hole.target)
-    drawn = _apart(placed, probes) <= _GROUND * spacing
+    drawn = _apart(placed, probes) <= _GROUND * spacing if checked else np.zeros(len(probes), bool)
     for number in tried:
         if drawn.any():
             moved, _ = project(plane_moves[number], probes[drawn])

@@ -65,7 +65,9 @@ def fill_by_stack(
         _fill(piece, labels, ground, known, hole, drawn, placed, survey, total, weight, most=most_tried)
     shown = weight > _SHOWN
     total /= np.maximum(weight, _SHOWN)[:, :, None]
-    _carry_rim(total, shown, pixels, known, ground, hole, placed)
+    sure = ground.sure
+    del ground, labels, drawn, weight  # a large photo's are much
+    _carry_rim(total, shown, pixels, sure, hole, placed)
     result = pixels.copy()
     filled = hole & shown
     np.copyto(result, np.clip(total, 0, 1, out=total), where=filled[:, :, None])
@@ -116,7 +118,10 @@ def _fill(
     one = hole_of(points, ground.pixels, known, placed, target=piece.target)
     if piece.beyond and not one.weights.any():
         return
-    found = sources(one, ground, placed, most=most, survey=survey)
+    allowed = drawn if piece.drawn else None
+    if piece.beyond:
+        allowed = 1 - drawn
+    found = sources(one, ground, placed, most=most, survey=survey, allowed=allowed)
     if not found:
         return
     weights = weighed(one, ground, found)
@@ -133,7 +138,7 @@ def _fill(
         weights,
         own & hole[window],
         corner=(left, top),
-        drawn=drawn if piece.drawn else None,
+        drawn=allowed,
         fading_px=radius,
     )
     share = feathered(own, radius) * (sure > _SHOWN)
@@ -173,9 +178,7 @@ def mixed(
     return (total / np.maximum(weight, 1e-9)[:, None]).astype(np.float32), weight
 
 
-def _carry_rim(
-    total: Floats, shown: Mask, pixels: Floats, known: Mask, ground: Ground, hole: Mask, placed: Placed
-) -> None:
+def _carry_rim(total: Floats, shown: Mask, pixels: Floats, sure: Floats, hole: Mask, placed: Placed) -> None:
     """Add to the fill `total` what the photo differs by from it at the hole's rim, carried inwards."""
     centers, front = placed.centers_px()
     _, parts, boxes, middles = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
@@ -184,13 +187,16 @@ def _carry_rim(
         left, top, right, bottom = _around(boxes[number], _RIM_PX + 1, width, height)
         window = (slice(top, bottom), slice(left, right))
         inside = (parts[window] == number).astype(np.uint8)
-        rim = rim_of(inside, (ground.sure[window] > 0) & shown[window], reach_px=_RIM_PX)
+        rim = rim_of(inside, (sure[window] > 0) & shown[window], reach_px=_RIM_PX)
         if not rim.any():
             continue
         away = np.hypot(*(centers - middles[number]).T)
         spacing = pitch_px(placed, int(np.argmin(np.where(front, away, np.inf))))
-        off = np.where(rim[..., None], pixels[window] - total[window], np.float32(0))
-        total[window] += np.where(inside[..., None] > 0, membrane(off, rim, spacing_px=spacing), np.float32(0))
+        off = np.zeros((*rim.shape, 3), np.float32)
+        off[rim] = pixels[window][rim] - total[window][rim]
+        lift = membrane(off, rim, spacing_px=spacing)
+        del off
+        np.add(total[window], lift, out=total[window], where=inside[..., None] > 0)
 
 
 def _around(box: NDArray, margin: int, width: int, height: int) -> tuple[int, int, int, int]:

@@ -34,6 +34,8 @@ _LEAST_SEEN = 0.25
 # So many places of a cell tell how alike cells are, and so many cells over which widths, in steps, they are.
 _TOLD, _JUDGED = 200, 200
 _WIDTHS = (0.6, 1.2, 2.4, 5.0, 20.0)
+# Light does not change within so many steps: what does is the objects' own colour.
+_LIGHT = 3.0
 # Contrast is drawn towards 1 as if by this variance: flat cells say nothing of it.
 _PRIOR_VARIANCE = 1e-3
 # Residuals of this size count half in finding a place; neighbouring samples tell the same: one in so many counts.
@@ -97,7 +99,9 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     if int((front & placed.in_sight()).sum()) < _FEWEST:
         return None
     count = len(placed.points)
-    reference = int(np.argmin(np.where(placed.in_sight(), np.hypot(*(at_px - np.median(at_px[front], 0)).T), np.inf)))
+    reference = int(
+        np.argmin(np.where(placed.in_sight(), np.hypot(*(at_px - np.median(at_px[front], 0)).T), np.inf))
+    )
     corners = polygons(chart_of(placed.pattern), placed.index[reference : reference + 1])[0]
     low, high = corners.min(0), corners.max(0)
     side = int(np.clip(np.sqrt(_SAMPLES / count), *_SIDES))
@@ -112,7 +116,9 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
 
     def read(offs: Array) -> tuple[Floats, Mask]:
         points = grid[None] + offs[:, None, None]
-        points = np.einsum("mij,mrcj->mrci", plane_moves[:, :2, :2], points) + plane_moves[:, None, None, :2, 2]
+        points = (
+            np.einsum("mij,mrcj->mrci", plane_moves[:, :2, :2], points) + plane_moves[:, None, None, :2, 2]
+        )
         at, ahead = project(placed.image_from_plane, points)
         spacing = np.maximum(*(np.linalg.norm(np.gradient(at, axis=axis), axis=-1) for axis in (1, 2)))
         flat = (count * side, side)
@@ -129,7 +135,7 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     information = np.zeros((count, 2, 2))
     levels, contrasts, misfit = np.zeros((count, 3)), np.ones((count, 3)), np.full(count, np.inf)
     variance, seen = np.zeros((count, 3)), np.zeros((count, side, side), bool)
-    lit, middle = np.zeros((count, side, side, 3), np.float32), np.zeros(3)
+    colours, middle = np.zeros((count, side, side, 3), np.float32), np.zeros(3)
     for _ in range(2):
         colours, seen = read(offs)
         share = seen.sum((1, 2)) / max(int(inside.sum()), 1)
@@ -150,11 +156,12 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
         found, information = _steps(slopes, residual, weights)
         offs = np.clip(offs + np.where(telling[:, None], found, 0), -most, most)
     information[~telling] = 0
-    told_at = np.argwhere(inside > 0)
-    told_at = told_at[:: max(1, len(told_at) // _TOLD)]
-    few, shown = lit[:, told_at[:, 0], told_at[:, 1]].astype(np.float32), seen[:, told_at[:, 0], told_at[:, 1]]
     basis = placed.basis
-    at = placed.index.astype(float) if basis is not None else placed.points / _spacing(placed.points, reference)
+    at = (
+        placed.index.astype(float)
+        if basis is not None
+        else placed.points / _spacing(placed.points, reference)
+    )
     spacing = _spacing(placed.points, reference)
     off = field_of(placed.points, offs, information, towards=np.zeros(2), spacing=spacing)
     smooth_offs = np.clip(off.at(placed.points), -most, most)
@@ -168,6 +175,12 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     surely = np.where(telling, share / np.maximum(misfit, 1e-3) ** 2, 0)
     level = _told(placed.points, levels, surely[:, None] * np.ones(3), middle, spacing)
     contrast = _told(placed.points, contrasts, surely[:, None] * variance, np.ones(3), spacing)
+    level_at, contrast_at = level.at(placed.points), np.clip(contrast.at(placed.points), 0.25, 4)
+    told_at = np.argwhere(inside > 0)
+    told_at = told_at[:: max(1, len(told_at) // _TOLD)].T
+    shown = seen[:, *told_at]
+    # In the light of the field, not in its own: what an object's colour differs by is its own.
+    few = ((colours[:, *told_at] - level_at[:, None]) / contrast_at[:, None] + middle).astype(np.float32)
     return Survey(
         placed.points,
         share,
@@ -176,8 +189,8 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
         at,
         _widths(few, shown, at, np.flatnonzero(telling), together=basis is None),
         float(np.hypot(*spread)) / spacing,
-        level.at(placed.points),
-        np.clip(contrast.at(placed.points), 0.25, 4),
+        level_at,
+        contrast_at,
         smooth_offs,
         own,
         plane_moves[:, :2, :2],
@@ -210,7 +223,7 @@ def _mean_of(lit: Floats, shown: Mask, near: Floats) -> Floats:
 
 def _told(places: Array, values: Array, surely: Array, towards: Array, spacing: float) -> Field:
     information = surely[:, :, None] * np.eye(values.shape[1])
-    return field_of(places, values, information, towards=towards, spacing=spacing)
+    return field_of(places, values, information, towards=towards, spacing=spacing, finest=_LIGHT)
 
 
 def _spacing(points: Array, number: int) -> float:
@@ -219,9 +232,7 @@ def _spacing(points: Array, number: int) -> float:
     return float(others.min()) if len(others) else 1.0
 
 
-def _common(
-    colours: Floats, seen: Mask, share: Array, light: tuple[Array, Array, Array] | None
-) -> Floats:
+def _common(colours: Floats, seen: Mask, share: Array, light: tuple[Array, Array, Array] | None) -> Floats:
     """The median [side, side, 3] of the cells that are seen best, in one light."""
     best = np.argsort(-share, kind="stable")[:_MOST_COMMON]
     best = best[share[best] >= min(_LEAST_SEEN, float(share[best[0]]))]
@@ -257,5 +268,7 @@ def _steps(slopes: list[NDArray], residual: NDArray, weights: NDArray) -> tuple[
     size = np.trace(normal, axis1=1, axis2=2)
     ridged = normal + (1e-3 * size + 1e-6)[:, None, None] * np.eye(2)
     found = np.linalg.solve(ridged, told[:, :, None])[:, :, 0]
-    scale = np.sqrt((weights[..., None] * residual**2).sum((1, 2, 3)) / np.maximum(3 * weights.sum((1, 2)), 1))
+    scale = np.sqrt(
+        (weights[..., None] * residual**2).sum((1, 2, 3)) / np.maximum(3 * weights.sum((1, 2)), 1)
+    )
     return found, normal / (_ALIKE * 3 * np.maximum(scale, 1e-3))[:, None, None]
