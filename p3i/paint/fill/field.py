@@ -1,9 +1,10 @@
 """A quantity told by some places of a plane, with how surely each tells it, evaluated at others.
 
-A plane is laid through what all places tell, robustly; what is left is averaged about each place asked for, nearer
-places counting more (kernel regression). How near is near is told by leaving each place out in turn.
+A plane is laid through what all places tell, robustly; what is left is averaged about each place asked for,
+nearer places counting more (kernel regression). How near is near is told by leaving each place out in turn.
 
-Convention: float64; M places [M, 2] in any one unit, values [M, C], information [M, C, C] (inverse covariance).
+Convention: float64; M places [M, 2] in any one unit, values [M, C], information [M, C, C] (inverse
+covariance).
 """
 
 from dataclasses import dataclass
@@ -51,7 +52,8 @@ class Field:
 def field_of(
     places: Array, values: Array, information: Array, *, towards: Array, spacing: float, finest: float = 0.0
 ) -> Field:
-    """The field that `values` tell; `towards` [C] is what it is where nothing tells, `spacing` how far the next is.
+    """The field that `values` tell; `towards` [C] is what it is where nothing tells, `spacing` how far the
+    next is.
 
     Places without information say nothing; no average is narrower than `finest` times the spacing.
     """

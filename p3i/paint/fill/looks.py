@@ -1,7 +1,7 @@
 """How a fill looks, beside how close it comes: is it as sharp as the pattern, and does its rim show?
 
-Both compare the hole with what the program shows at the same places of other cells, so that neither asks for the truth,
-and what is soft by itself may be soft.
+Both compare the hole with what the program shows at the same places of other cells, so that neither asks
+for the truth, and what is soft by itself may be soft.
 
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W].
 """
@@ -44,7 +44,8 @@ def sharpness(filled: Floats, known: Mask, hole: Mask, placed: Placed) -> float:
         columns, rows = points.astype(int).T
         for at, shown, area in others:
             got += float(energy[rows, columns][shown].sum())
-            # Steps between pixels are as much smaller as the cell is larger there, and there are more of them.
+            # Steps between pixels are as much smaller as the cell is larger there, and there are more of
+            # them.
             wanted += float((taken(energy, at) * area)[shown].sum())
     return got / wanted if wanted > 0 else float("nan")
 

@@ -28,8 +28,8 @@ def _shift_step(
 ) -> Array:
     """The step [2] that lessens the residual [K, 3]; `slopes` are the colours' along x and y, [K, 3] each.
 
-    One robust step of Lucas and Kanade (IJCAI 1981), with shifts of `likely_px` as likely as it is likely that
-    the residual is noise.
+    One robust step of Lucas and Kanade (IJCAI 1981), with shifts of `likely_px` as likely as it is likely
+    that the residual is noise.
     """
     robust = weights[:, None] / (np.abs(residual) + _ROBUST)
     normal = np.array([[(robust * one * other).sum() for other in slopes] for one in slopes])
@@ -72,8 +72,8 @@ def aligned(
     """The shift [2] under which a source is likest to what is wanted, its gain and offset [3], its misfit.
 
     `read` gives the source's colours [K, 3] under a shift of up to `most_px` along each axis. The misfit is
-    the mean difference that is left of `wanted` [K, 3], by `weights` [K]. For gain and offset it counts by its `share`
-    (0..1), the rest is those of `light`; shifts are drawn to those that are `likely_px`.
+    the mean difference that is left of `wanted` [K, 3], by `weights` [K]. For gain and offset it counts by
+    its `share` (0..1), the rest is those of `light`; shifts are drawn to those that are `likely_px`.
     """
     best: tuple[Array, Array, Array, float] | None = None
     shift = np.zeros(2)

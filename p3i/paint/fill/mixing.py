@@ -1,8 +1,8 @@
 """The picture of one piece of a hole: a mean of its sources, and grain given back by the best of them.
 
-A mean comes closest to what is hidden, and is softer than any source: what differs between them averages out. How much
-softer is measured, as gradient energy beside that of the sources at the same places, and so much of
-what the best source shows beyond the mean is added that the piece is as sharp as the pattern is.
+A mean comes closest to what is hidden, and is softer than any source: what differs between them averages
+out. How much softer is measured, as gradient energy beside that of the sources at the same places, and so
+much of what the best source shows beyond the mean is added that the piece is as sharp as the pattern is.
 
 Convention: a window of the photo, [h, w] pixels; colours float32 RGB.
 """
@@ -23,7 +23,8 @@ Mask = NDArray[np.bool_]
 _LEAST = 1e-3
 # What a source shows is its own where it is known so far.
 _WHOLE = 0.99
-# Grain is what is finer than this, in pixels, and it is given back until the mean is as sharp as this share of the sources.
+# Grain is what is finer than this, in pixels, and it is given back until the mean is as sharp as this share
+# of the sources.
 _GRAIN_PX = 1.5
 _QUANTILE = 0.25
 # So many pixels tell how sharp a window is.
@@ -74,7 +75,7 @@ def painted(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """A source in a window: its misfit, its `energy` a pixel (None where it shows less than half), and its picture.
+    """A source in a window: its misfit, its `energy` a pixel (None where it shows too little), its picture.
 
     The picture, colours [h, w, 3] and how far known [h, w], is kept of the best only.
     """

@@ -1,4 +1,5 @@
-"""The pieces of a hole: each hidden pixel belongs to the nearest object's cell, inside the pattern or beyond it.
+"""The pieces of a hole: each hidden pixel belongs to the nearest object's cell, inside the pattern or
+beyond it.
 
 A hole of few cells is one piece: what is seen around it binds all of it together.
 
@@ -38,8 +39,8 @@ _SLACK_PX = 1
 class Piece:
     """A part of a hole, seen from one object: what lies in its cell, or a small hole of its own.
 
-    `number` is that of its pixels; `box` (left, top, right, bottom; half-open) holds them all. `drawn` is whether it
-    is a cell of the pattern: only such ground is like it. `beyond` the pattern nothing is.
+    `number` is that of its pixels; `box` (left, top, right, bottom; half-open) holds them all. `drawn` is
+    whether it is a cell of the pattern: only such ground is like it. `beyond` the pattern nothing is.
     """
 
     number: int
@@ -112,7 +113,7 @@ def _padded(box: NDArray, shape: tuple[int, ...]) -> Box:
 
 
 def _nearest_in(box: Box, placed: Placed) -> NDArray[np.int32]:
-    """The object nearest to each pixel of a box [h, w]; where cells are large, to that of a block of pixels."""
+    """The object nearest to each pixel of a box [h, w]; where cells are large, to a block of pixels."""
     left, top, right, bottom = box
     pixels, front = placed.centers_px()
     middle = ((left + right) / 2, (top + bottom) / 2)

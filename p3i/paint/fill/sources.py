@@ -57,8 +57,8 @@ class Hole:
     """One piece of what is to be filled, seen from the object `target` in its middle.
 
     `points` [L, 2] are its pixels; `around` [K, 2] pixels beside it, with `weights` [K] by nearness and the
-    `colours` [K, 3] that the photo has there. `spacing_px` is how far the next object lies, `surrounded` (0..1)
-    how much of the surroundings is known.
+    `colours` [K, 3] that the photo has there. `spacing_px` is how far the next object lies, `surrounded`
+    (0..1) how much of the surroundings is known.
     """
 
     target: int
@@ -201,9 +201,9 @@ def sources(
     """The sources of a hole among the `most` nearest objects, the likest first, so many as are `kept`.
 
     What the hole's surroundings do not tell of light, shift and likeness, the `survey` does; without either
-    there are none, as where the program draws nothing like the hole in sight. Where none of those kept shows a
-    part of the hole, further ones do. What they show lies on `allowed` ground, 1 [H, W]; without it those that
-    would bring in ground where nothing is drawn are left out.
+    there are none, as where the program draws nothing like the hole in sight. Where none of those kept
+    shows a part of the hole, further ones do. What they show lies on `allowed` ground, 1 [H, W]; without it
+    those that would bring in ground where nothing is drawn are left out.
     """
     if not len(hole.around) and survey is None:
         return []

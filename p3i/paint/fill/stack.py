@@ -1,10 +1,12 @@
-"""Filling from aligned cells: each hidden cell becomes a mean of its sources, weighted by what they say around it.
+"""Filling from aligned cells: each hidden cell becomes a mean of its sources, weighted by what they say
+around it.
 
 The plane is split by the program's objects, and each cell's hidden part has a stack of its own (sources.py):
-other cells that show it, wholly or half of it each. The weights are those under which they together come closest to the photo
-around the part, drawn towards trusting each by its own misfit. Deep in a hole, where nothing is seen around, light and
-shift are told by all cells of the photo (survey.py), never by what was filled before. Cells go over into each
-other softly; what still differs at the hole's rim is carried into it smoothly.
+other cells that show it, wholly or half of it each. The weights are those under which they together come
+closest to the photo around the part, drawn towards trusting each by its own misfit. Deep in a hole, where
+nothing is seen around, light and shift are told by all cells of the photo (survey.py), never by what was
+filled before. Cells go over into each other softly; what still differs at the hole's rim is carried into it
+smoothly.
 
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W], True is to be filled.
 """

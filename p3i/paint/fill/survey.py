@@ -1,10 +1,11 @@
 """All cells of a photo side by side: what they share, and how light and place change smoothly over the photo.
 
 Each cell is read on one grid, by the program's own moves. The common cell is their median; each cell tells
-its light against it (a level and a contrast for each channel) and how far the program is off there. Both are smooth
-over the photo, so that cells which show nothing of themselves have them too, told by all that do.
+its light against it (a level and a contrast for each channel) and how far the program is off there. Both
+are smooth over the photo, so that cells which show nothing of themselves have them too, told by all that do.
 
-Convention: program units on the plane of one cell, the `reference`; colours RGB in 0..1; M objects, G places of the grid.
+Convention: program units on the plane of one cell, the `reference`; colours RGB in 0..1; M objects, G
+places of the grid.
 """
 
 from dataclasses import dataclass
@@ -38,7 +39,8 @@ _WIDTHS = (0.6, 1.2, 2.4, 5.0, 20.0)
 _LIGHT = 3.0
 # Contrast is drawn towards 1 as if by this variance: flat cells say nothing of it.
 _PRIOR_VARIANCE = 1e-3
-# Residuals of this size count half in finding a place; neighbouring samples tell the same: one in so many counts.
+# Residuals of this size count half in finding a place; neighbouring samples tell the same: one in so many
+# counts.
 _ROBUST = 0.02
 _ALIKE = 9.0
 # Cells are off by no more than this share of the cell's shorter side.
@@ -47,12 +49,14 @@ _MOST_OFF = 0.12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """The cells: `seen` [M] in shares; `lit` [M, P, 3] is each in the common light, `shown` [M, P] where it is known.
+    """The cells: `seen` [M] in shares; `lit` [M, P, 3] is each in the common light, `shown` [M, P] where it
+    is known.
 
-    `levels`, `contrasts` [M, 3] are the light there by its field, `offs` [M, 2] the shift, on the reference's plane;
-    `own_offs` [M, 2] are each cell's own, drawn to the field by how surely it tells; `turns` [M, 2, 2] bring
-    the reference's plane to that of each. `places` [M, 2] lie on the plane. Cells at `at` [M, 2], in steps of the
-    program, are alike over the `widths` [2]; they lie off their field by `likely_off`, in distances to the next object.
+    `levels`, `contrasts` [M, 3] are the light there by its field, `offs` [M, 2] the shift, on the
+    reference's plane; `own_offs` [M, 2] are each cell's own, drawn to the field by how surely it tells;
+    `turns` [M, 2, 2] bring the reference's plane to that of each. `places` [M, 2] lie on the plane. Cells
+    at `at` [M, 2], in steps of the program, are alike over the `widths` [2]; they lie off their field by
+    `likely_off`, in distances to the next object.
     """
 
     places: Array
@@ -165,7 +169,8 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     spacing = _spacing(placed.points, reference)
     off = field_of(placed.points, offs, information, towards=np.zeros(2), spacing=spacing)
     smooth_offs = np.clip(off.at(placed.points), -most, most)
-    # Each cell's own shift is drawn to the field's by what it tells, as if cells lay about it by what they were found to.
+    # Each cell's own shift is drawn to the field's by what it tells, as if cells lay about it by what they
+    # were found to.
     spread = np.median(np.abs(offs - smooth_offs)[telling], 0) * 1.48 + 1e-9
     prior = np.diag(1 / spread**2)
     own = np.linalg.solve(
@@ -247,7 +252,7 @@ def _common(colours: Floats, seen: Mask, share: Array, light: tuple[Array, Array
 
 
 def _light(colours: Floats, weights: Floats, common: Floats) -> tuple[Array, Array, Array]:
-    """The level and contrast [M, 3] of cells against the common one, and the variance that tells of the latter."""
+    """The level and contrast [M, 3] of cells against the common one, and the variance that tells of it."""
     inside = weights[..., None] / np.maximum(weights.sum((1, 2)), 1)[:, None, None, None]
     mean, wanted = (inside * colours).sum((1, 2)), (inside * common).sum((1, 2))
     around = common - wanted[:, None, None]
@@ -260,7 +265,7 @@ def _light(colours: Floats, weights: Floats, common: Floats) -> tuple[Array, Arr
 
 
 def _steps(slopes: list[NDArray], residual: NDArray, weights: NDArray) -> tuple[Array, Array]:
-    """The step [M, 2] of each cell's place that lessens its residual [M, side, side, 3], and its information."""
+    """The step [M, 2] of each cell's place that lessens its residual [M, side, side, 3]; its information."""
     robust = weights[..., None] / (np.abs(residual) + _ROBUST)
     normal = np.array([[(robust * one * other).sum((1, 2, 3)) for other in slopes] for one in slopes])
     normal = normal.transpose(2, 0, 1).astype(float)
