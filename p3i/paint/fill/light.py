@@ -26,15 +26,28 @@ _COARSE_SIGMA = 16.0
 _LEAST_SIGMA = 4.0
 
 
-def matched_light(colours: NDArray, wanted: NDArray, weights: NDArray) -> tuple[Array, Array]:
-    """The gain and offset [3] that bring colours [K, 3] closest to those wanted; 1 and 0 without weight."""
-    share = (weights / max(float(weights.sum()), 1e-9))[:, None].astype(float)
-    mean, wanted_mean = (share * colours).sum(0), (share * wanted).sum(0)
-    variance = (share * (colours - mean) ** 2).sum(0)
-    together = (share * (colours - mean) * (wanted - wanted_mean)).sum(0)
+def matched_light(
+    colours: NDArray,
+    wanted: NDArray,
+    weights: NDArray,
+    *,
+    light: tuple[Array, Array] | None = None,
+    share: float = 1.0,
+) -> tuple[Array, Array]:
+    """The gain and offset [3] that bring colours [K, 3] closest to those wanted; 1 and 0 without weight.
+
+    Those of `light` count instead, as far as the colours have not all of the `share` (0..1).
+    """
+    before, lifted = light if light is not None else (np.ones(3), np.zeros(3))
+    parts = (weights / max(float(weights.sum()), 1e-9))[:, None].astype(float)
+    mean, wanted_mean = (parts * colours).sum(0), (parts * wanted).sum(0)
+    variance = (parts * (colours - mean) ** 2).sum(0)
+    together = (parts * (colours - mean) * (wanted - wanted_mean)).sum(0)
     prior = _PRIOR * variance + _PRIOR_VARIANCE
-    gain = np.clip((together + prior) / (variance + prior), *_GAINS)
-    return gain, wanted_mean - gain * mean
+    prior += (1 - share) / share * variance
+    gain = np.clip((together + before * prior) / (variance + prior), *_GAINS)
+    level = share * wanted_mean + (1 - share) * (before * mean + lifted)
+    return gain, level - gain * mean
 
 
 def rim_of(hole: NDArray, known: NDArray, *, reach_px: float) -> NDArray[np.bool_]:
@@ -48,8 +61,9 @@ def membrane(off: NDArray, rim: NDArray[np.bool_], *, spacing_px: float) -> Floa
 
     0 without a rim; nothing is lifted or lowered by more than `_MOST_CARRIED`.
     """
-    limited = np.clip(off, -_MOST_CARRIED, _MOST_CARRIED).astype(np.float32)
-    return carried(limited * rim[:, :, None], rim.astype(np.float32), spacing_px=spacing_px)
+    limited = np.where(rim[:, :, None], off, 0).astype(np.float32)
+    np.clip(limited, -_MOST_CARRIED, _MOST_CARRIED, out=limited)
+    return carried(limited, rim.astype(np.float32), spacing_px=spacing_px)
 
 
 def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:

@@ -14,7 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.paint.fill.light import matched_light
 from p3i.paint.fill.matching import aligned
+from p3i.paint.fill.survey import Survey
 from p3i.place.moves import moves, nearest, pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.sheet import project
@@ -26,7 +28,9 @@ Mask = NDArray[np.bool_]
 
 # The surroundings that a hole is judged by reach this far, in distances to the next object.
 _MARGIN = 0.4
-_MOST_SURROUNDING = 3000
+_MOST_SURROUNDING = 2000
+# What all cells tell counts as much as this share of the surroundings.
+_ALL_CELLS = 0.1
 # The nearer to the hole, the more a place tells: weights fall to 1/e over this share of the margin.
 _FADING = 0.4
 # So many of the nearest objects are tried, and so many of the best kept, ...
@@ -35,13 +39,15 @@ _MOST_KEPT = 12
 # ... none with a misfit above this many times the best's; a source shows this much of hole and surroundings.
 _WORSE = 1.6
 _WORSE_ANYWAY = 0.002
-_LEAST_OF_HOLE, _LEAST_AROUND = 0.25, 0.25
-# Of a hole, about this many pixels tell how much of it a source shows.
-_MOST_ASKED = 100_000
+_LEAST_OF_HOLE, _LEAST_AROUND = 0.05, 0.25
+# So many of those that are likest as the program lays them are shifted and lit.
+_TRIED_FINELY = 24
 # A source lies on drawn ground where an object is as near as this, in distances; so must this share of it.
 _GROUND = 0.75
 _LEAST_ON_GROUND = 0.6
-_PROBES = 400
+_PROBES = 256
+# Sources fade in over so many pixels at most where known ground ends.
+_DEEPEST = 32.0
 # Shifts reach this far, in distances to the next object.
 _MOST_SHIFT = 0.12
 
@@ -51,7 +57,8 @@ class Hole:
     """One piece of what is to be filled, seen from the object `target` in its middle.
 
     `points` [L, 2] are its pixels; `around` [K, 2] pixels beside it, with `weights` [K] by nearness and the
-    `colours` [K, 3] that the photo has there. `spacing_px` is how far the next object lies.
+    `colours` [K, 3] that the photo has there. `spacing_px` is how far the next object lies, `surrounded`
+    (0..1) how much of the surroundings is known.
     """
 
     target: int
@@ -60,39 +67,32 @@ class Hole:
     weights: Floats
     colours: Floats
     spacing_px: float
+    surrounded: float = 1.0
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Source:
-    """A source of a hole: the photo's matrix `from_hole` [3, 3] and `shift_px` [2] take a pixel to its like.
-
-    `gain` and `offset` [3] bring its colours to the hole's light; `misfit` is the mean difference around.
-    """
-
-    from_hole: Array
-    shift_px: Array
-    gain: Array
-    offset: Array
-    misfit: float
-
-    def where(self, points: Array) -> tuple[Array, Mask]:
-        """The points [L, 2] like these, and which lie in front of the camera."""
-        at, front = project(self.from_hole, points)
-        return at + self.shift_px, front
+    @property
+    def share(self) -> float:
+        """How much what lies around counts beside what all cells tell: half where a tenth of it is known."""
+        return self.surrounded / (self.surrounded + _ALL_CELLS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """A photo with its hole as a place to take colours from: `pixels` [H, W, 3], `sure` float [H, W]."""
+    """A photo with its hole as a place to take colours from: `pixels` [H, W, 3], `sure` float [H, W].
+
+    `inwards` [H, W] is how many pixels each lies inside what is sure, at most `_DEEPEST`.
+    """
 
     pixels: Floats
     sure: Floats
+    inwards: Floats
 
     @classmethod
     def of(cls, pixels: Floats, known: Mask) -> "Ground":
         """What is known, and one pixel away from what is not, since samples mix neighbours."""
         padded = np.pad(known.astype(np.uint8), 1)
-        return cls(pixels, cv2.erode(padded, np.ones((3, 3), np.uint8))[1:-1, 1:-1].astype(np.float32))
+        sure = cv2.erode(padded, np.ones((3, 3), np.uint8))
+        inwards = np.minimum(cv2.distanceTransform(sure, cv2.DIST_L2, 3), _DEEPEST)[1:-1, 1:-1]
+        return cls(pixels, sure[1:-1, 1:-1].astype(np.float32), np.ascontiguousarray(inwards, np.float32))
 
     def known(self, points: Array) -> Mask:
         """Which of the points [L, 2] can be read."""
@@ -102,11 +102,71 @@ class Ground:
         return inside & (taken(self.sure, points) > 0.99)
 
 
-def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed) -> Hole:
-    """A piece of the hole, its pixels [L, 2], with its surroundings: what is `known` [H, W] of `shown`."""
-    pixels, front = placed.centers_px()
-    away = np.hypot(*(pixels - points.mean(0)).T)
-    target = int(np.argmin(np.where(front, away, np.inf)))
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """A source of a hole: the photo's matrix `from_hole` [3, 3] and `shift_px` [2] take a pixel to its like.
+
+    `gain` and `offset` [3] bring its colours to the hole's light; `misfit` is the mean difference around.
+    `number` is the object whose ground it is.
+    """
+
+    from_hole: Array
+    shift_px: Array
+    gain: Array
+    offset: Array
+    misfit: float
+    number: int = -1
+
+    def where(self, points: Array) -> tuple[Array, Mask]:
+        """The points [L, 2] like these, and which lie in front of the camera."""
+        at, front = project(self.from_hole, points)
+        return at + self.shift_px, front
+
+    def window(
+        self,
+        ground: Ground,
+        corner: tuple[int, int],
+        size: tuple[int, int],
+        *,
+        drawn: NDArray[np.uint8] | None,
+        fading_px: float,
+    ) -> tuple[Floats, Floats] | None:
+        """What it shows in a window at `corner` of `size` (width, height), in the hole's light: [h, w, 3].
+
+        And how far that is known, [h, w] in 0..1: it fades over `fading_px` where known ground ends, and is 0
+        where `drawn` [H, W] is. None where nothing is known.
+        """
+        matrix = np.eye(3)
+        matrix[:2, 2] = self.shift_px
+        matrix = matrix @ self.from_hole
+        matrix[:, 2] += matrix[:, :2] @ corner
+        ends = np.array([(0, 0), (size[0], 0), (0, size[1]), size], float)
+        if not project(matrix, ends)[1].all():
+            return None
+        how = {"flags": cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, "borderMode": cv2.BORDER_CONSTANT}
+        known = np.asarray(cv2.warpPerspective(ground.inwards, matrix, size, **how), np.float32)
+        np.minimum(known / np.float32(max(1.0, min(fading_px, _DEEPEST))), 1, out=known)
+        if drawn is not None:
+            how["flags"] = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+            known *= cv2.warpPerspective(drawn, matrix, size, **how)
+        if not known.any():
+            return None
+        how = {"flags": cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP, "borderMode": cv2.BORDER_REPLICATE}
+        colours = np.asarray(cv2.warpPerspective(ground.pixels, matrix, size, **how), np.float32)
+        colours *= self.gain.astype(np.float32)
+        colours += self.offset.astype(np.float32)
+        return colours, known
+
+
+def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed, *, target: int | None = None) -> Hole:
+    """A piece of the hole, its pixels [L, 2], with its surroundings: what is `known` [H, W] of `shown`.
+
+    It is seen from the object `target`, without one from that nearest to its middle.
+    """
+    if target is None:
+        pixels, front = placed.centers_px()
+        away = np.hypot(*(pixels - points.mean(0)).T)
+        target = int(np.argmin(np.where(front, away, np.inf)))
     spacing = pitch_px(placed, target)
     margin = max(4, round(_MARGIN * spacing))
     low = np.maximum(points.min(0).astype(int) - margin, 0)
@@ -116,27 +176,74 @@ def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed) -> Hole:
     columns, rows = (points.astype(int) - low).T
     outside[rows, columns] = 0
     distance = cv2.distanceTransform(outside, cv2.DIST_L2, 5)
-    near_rows, near_columns = np.nonzero((distance <= margin) & free)
+    near = (distance <= margin) & (outside > 0)
+    surroundings = np.exp(-distance[near] / (_FADING * margin))
+    surrounded = float(surroundings[free[near]].sum() / max(float(surroundings.sum()), 1e-9))
+    near_rows, near_columns = np.nonzero(near & free)
     spread = np.linspace(0, len(near_rows) - 1, min(len(near_rows), _MOST_SURROUNDING)).astype(int)
     near_rows, near_columns = near_rows[spread], near_columns[spread]
     weights = np.exp(-distance[near_rows, near_columns] / (_FADING * margin)).astype(np.float32)
     around = np.stack([near_columns, near_rows], 1) + low
     colours = shown[around[:, 1], around[:, 0]]
-    return Hole(target, points, around.astype(float), weights, colours, spacing)
+    return Hole(target, points, around.astype(float), weights, colours, spacing, surrounded)
 
 
 def sources(
-    hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED, kept: int = _MOST_KEPT
+    hole: Hole,
+    ground: Ground,
+    placed: Placed,
+    *,
+    most: int = MOST_TRIED,
+    kept: int = _MOST_KEPT,
+    survey: Survey | None = None,
+    allowed: NDArray[np.uint8] | None = None,
 ) -> list[Source]:
     """The sources of a hole among the `most` nearest objects, the likest first, so many as are `kept`.
 
-    There are none where the program draws nothing like it in sight.
+    What the hole's surroundings do not tell of light, shift and likeness, the `survey` does; without either
+    there are none, as where the program draws nothing like the hole in sight. Where none of those kept
+    shows a part of the hole, further ones do. What they show lies on `allowed` ground, 1 [H, W]; without it
+    those that would bring in ground where nothing is drawn are left out.
     """
-    if not len(hole.around):
+    if not len(hole.around) and survey is None:
         return []
-    found = [_aligned(hole, ground, matrix) for matrix in laid_on(hole, ground, placed, most=most)]
-    alike = sorted((one for one in found if one is not None), key=lambda source: source.misfit)
-    return [one for one in alike if one.misfit <= _WORSE * alike[0].misfit + _WORSE_ANYWAY][:kept]
+    asked = hole.points[:: max(1, len(hole.points) // _PROBES)]
+    misfits = np.full(len(placed.points), np.inf) if survey is None else survey.misfits(hole.target)
+    found: list[tuple[float, int, Array, float, Mask]] = []
+    for number, matrix in _laid_on(hole, ground, placed, most=most, survey=survey, checked=allowed is None):
+        at, front = project(matrix, asked)
+        shown = front & ground.known(at)
+        if allowed is not None:
+            columns, rows = np.rint(np.clip(at, 0, np.array(allowed.shape[::-1]) - 1)).astype(int).T
+            shown &= allowed[rows, columns] > 0
+        if shown.mean() < _LEAST_OF_HOLE:
+            continue
+        expected = _expected_misfit(hole, matrix, float(misfits[number]))
+        misfit = _first_misfit(hole, ground, matrix, number, survey, expected)
+        if np.isfinite(misfit):
+            found.append((misfit, number, matrix, expected, shown))
+    found.sort(key=lambda one: one[0])
+    finely = max(_TRIED_FINELY, kept)
+
+    def fine(one: tuple[float, int, Array, float, Mask]) -> Source:
+        return _aligned(hole, ground, one[2], one[1], survey, one[3])
+
+    alike = sorted(((fine(one), one[4]) for one in found[:finely]), key=lambda one: one[0].misfit)
+    result: list[Source] = []
+    covered = np.zeros(len(asked), bool)
+    for source, shown in alike:
+        if source.misfit <= _WORSE * alike[0][0].misfit + _WORSE_ANYWAY and len(result) < kept:
+            result.append(source)
+            covered |= shown
+    for source, shown in alike:
+        if (shown & ~covered).any():
+            result.append(source)
+            covered |= shown
+    for one in found[finely:]:
+        if (one[4] & ~covered).any():
+            result.append(fine(one))
+            covered |= one[4]
+    return result
 
 
 def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = MOST_TRIED) -> Mask:
@@ -152,43 +259,118 @@ def shown_elsewhere(hole: Hole, ground: Ground, placed: Placed, *, most: int = M
 
 def laid_on(hole: Hole, ground: Ground, placed: Placed, *, most: int) -> Iterator[Array]:
     """The photo's matrices [3, 3] that take the hole to its like on other drawn ground, the nearest first."""
+    for _, matrix in _laid_on(hole, ground, placed, most=most, survey=None):
+        yield matrix
+
+
+def _laid_on(
+    hole: Hole, ground: Ground, placed: Placed, *, most: int, survey: Survey | None, checked: bool = True
+) -> Iterator[tuple[int, Array]]:
+    """The objects and matrices of `laid_on`, with the shift that a survey tells."""
     pixels, _ = placed.centers_px()
     away = np.hypot(*(pixels - pixels[hole.target]).T)
     plane_moves = moves(placed, hole.target)
     usable = placed.in_sight() & np.isfinite(plane_moves).all((1, 2))
+    if survey is not None:
+        usable |= (survey.seen > 0) & np.isfinite(plane_moves).all((1, 2))
     usable[hole.target] = False
     # What is itself to be filled in its middle comes last: around a picture that grows there is much of it.
     order = np.lexsort((away, ~ground.known(pixels)))
-    tried = [number for number in order if usable[number]][:most]
+    tried = [int(number) for number in order if usable[number]][:most]
     plane_from_image = np.linalg.inv(placed.image_from_plane)
     probes = hole.points[:: max(1, len(hole.points) // _PROBES)]
     probes, _ = project(plane_from_image, probes)
     spacing = _spacing(placed, hole.target)
-    drawn = _apart(placed, probes) <= _GROUND * spacing
+    drawn = _apart(placed, probes) <= _GROUND * spacing if checked else np.zeros(len(probes), bool)
     for number in tried:
-        moved, _ = project(plane_moves[number], probes)
-        scale = np.sqrt(abs(np.linalg.det(plane_moves[number][:2, :2])))
-        on_ground = _apart(placed, moved) <= _GROUND * spacing * scale
-        if (on_ground | ~drawn).mean() < _LEAST_ON_GROUND:
-            continue
-        yield placed.image_from_plane @ plane_moves[number] @ plane_from_image
+        if drawn.any():
+            moved, _ = project(plane_moves[number], probes[drawn])
+            scale = np.sqrt(abs(np.linalg.det(plane_moves[number][:2, :2])))
+            on_ground = int((_apart(placed, moved) <= _GROUND * spacing * scale).sum())
+            if on_ground + int((~drawn).sum()) < _LEAST_ON_GROUND * len(probes):
+                continue
+        move = plane_moves[number]
+        if survey is not None:
+            shift = np.eye(3)
+            shift[:2, 2] = survey.between(hole.target, number)
+            move = move @ shift
+        yield number, placed.image_from_plane @ move @ plane_from_image
 
 
-def _aligned(hole: Hole, ground: Ground, from_hole: Array) -> Source | None:
-    """The source under this matrix, shifted and in the hole's light; None where too little of it shows."""
-    at, front = project(from_hole, hole.points[:: max(1, len(hole.points) // _MOST_ASKED)])
-    if (front & ground.known(at)).mean() < _LEAST_OF_HOLE:
-        return None
+def _first_misfit(
+    hole: Hole, ground: Ground, from_hole: Array, number: int, survey: Survey | None, expected: float
+) -> float:
+    """How unlike a source is before it is shifted; inf where too little tells."""
+    light = None if survey is None else survey.light(hole.target, number)
+    at, weights = _around(hole, ground, from_hole)
+    if not weights.any():
+        return expected
+    colours = taken(ground.pixels, at)
+    share = 1.0 if survey is None else _share(hole, weights)
+    gain, offset = matched_light(colours, hole.colours, weights, light=light, share=share)
+    off = np.abs(hole.colours - gain * colours - offset)
+    return _judged(hole, float((weights[:, None] * off).sum() / weights.sum() / 3), weights, expected)
+
+
+def _expected_misfit(hole: Hole, from_hole: Array, misfit: float) -> float:
+    """How much a source differs from what is expected in the hole: the more, the smaller it is seen."""
+    if not np.isfinite(misfit):
+        return misfit
+    middle = hole.points.mean(0)
+    at, _ = project(from_hole, middle + np.array([(-1.0, 0), (1, 0), (0, -1), (0, 1)]))
+    slopes = np.stack([at[1] - at[0], at[3] - at[2]]) / 2
+    smaller = 1 / max(float(np.linalg.svd(slopes, compute_uv=False)[1]), 1e-3)
+    return misfit * max(1.0, smaller)
+
+
+def _around(hole: Hole, ground: Ground, from_hole: Array) -> tuple[Array, Floats]:
+    """Where a source shows the surroundings of a hole [K, 2], and how much each place counts [K]."""
+    if not len(hole.around):
+        return hole.around, hole.weights
     at, front = project(from_hole, hole.around)
     weights = hole.weights * (front & ground.known(at))
     if (weights > 0).mean() < _LEAST_AROUND:
-        return None
+        weights = np.zeros_like(weights)
+    return at, weights
+
+
+def _judged(hole: Hole, misfit: float, weights: Floats, expected: float) -> float:
+    """A source's misfit around its hole and to the expected cell as one, each as far as it tells."""
+    if not np.isfinite(expected):
+        return misfit
+    share = _share(hole, weights)
+    return float(np.sqrt(share * misfit**2 + (1 - share) * expected**2))
+
+
+def _share(hole: Hole, weights: Floats) -> float:
+    """How much the surroundings that a source shows tell."""
+    shown = hole.surrounded * float(weights.sum()) / max(float(hole.weights.sum()), 1e-9)
+    return shown / (shown + _ALL_CELLS)
+
+
+def _aligned(
+    hole: Hole, ground: Ground, from_hole: Array, number: int, survey: Survey | None, expected: float
+) -> Source:
+    """The source under this matrix, shifted and in the hole's light."""
+    light = None if survey is None else survey.light(hole.target, number)
+    at, weights = _around(hole, ground, from_hole)
+    if not weights.any():
+        gain, offset = light if light is not None else (np.ones(3), np.zeros(3))
+        return Source(from_hole, np.zeros(2), gain, offset, expected, number)
 
     def read(shift: Array) -> Floats:
         return taken(ground.pixels, at + shift)
 
-    most_px = _MOST_SHIFT * hole.spacing_px
-    return Source(from_hole, *aligned(read, hole.colours, weights=weights, most_px=most_px))
+    shift, gain, offset, misfit = aligned(
+        read,
+        hole.colours,
+        weights=weights,
+        most_px=_MOST_SHIFT * hole.spacing_px,
+        light=light,
+        share=1.0 if survey is None else _share(hole, weights),
+        likely_px=np.inf if survey is None else survey.likely_off * hole.spacing_px,
+    )
+    return Source(from_hole, shift, gain, offset, _judged(hole, misfit, weights, expected), number)
 
 
 def _spacing(placed: Placed, target: int) -> float:

@@ -1,8 +1,12 @@
-"""Filling from aligned cells: each hole becomes a mean of its sources, weighted by what they say around it.
+"""Filling from aligned cells: each hidden cell becomes a mean of its sources, weighted by what they say
+around it.
 
-The weights are those under which the sources together come closest to the photo around the hole (a regression
-drawn towards trusting each by its own misfit); what still differs at the hole's rim is carried into it
-smoothly, so that light and seams go over without an edge.
+The plane is split by the program's objects, and each cell's hidden part has a stack of its own (sources.py):
+other cells that show it, wholly or half of it each. The weights are those under which they together come
+closest to the photo around the part, drawn towards trusting each by its own misfit. Deep in a hole, where
+nothing is seen around, light and shift are told by all cells of the photo (survey.py), never by what was
+filled before. Cells go over into each other softly; what still differs at the hole's rim is carried into it
+smoothly.
 
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W], True is to be filled.
 """
@@ -15,11 +19,13 @@ from numpy.typing import NDArray
 
 from p3i.paint.fill.light import membrane, rim_of
 from p3i.paint.fill.matching import trusted
+from p3i.paint.fill.mixing import feathered, painted
+from p3i.paint.fill.pieces import Piece, drawn_on, pieces_of
 from p3i.paint.fill.sources import MOST_TRIED, Ground, Hole, Source, hole_of, shown_elsewhere, sources
-from p3i.place.moves import nearest
+from p3i.paint.fill.survey import Survey, survey_of
+from p3i.place.moves import pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.fill import fill_in
-from p3i.vision.sheet import project
 from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
@@ -27,10 +33,12 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Progress = Callable[[str, float], None]
 
-# A piece of a hole with more cells than this is filled in blocks of two by two.
-_MOST_CELLS = 9
 # The rim at which the fill is compared with the photo, in pixels.
-_RIM_PX = 4.0
+_RIM_PX = 4
+# Cells go over into each other, and sources fade, within this share of the distance to the next object.
+_FADING = 0.08
+# A pixel is shown where the weights of its sources come to this.
+_SHOWN = 1e-6
 
 
 def fill_by_stack(
@@ -49,24 +57,26 @@ def fill_by_stack(
     """
     known = known & ~hole
     ground = Ground.of(pixels, known)
-    result = pixels.copy()
-    result[hole] = 0
-    context = known.copy()  # what the next piece is compared with: also what was filled before it
-    bare = np.zeros_like(hole)
-    before = np.zeros_like(hole)  # what pieces next to the one in hand have been given
-    pieces = _pieces(hole, known, placed)
-    for done, points in enumerate(pieces):
+    drawn = drawn_on(placed)
+    pieces, labels = pieces_of(hole, drawn, placed)
+    survey = survey_of(pixels, known, placed)
+    total, weight = np.zeros_like(pixels), np.zeros(hole.shape, np.float32)
+    for done, piece in enumerate(pieces):
         if progress is not None:
             progress("filling", done / len(pieces))
-        one = hole_of(points, result, context, placed)
-        colours, seen = _filled(one, ground, sources(one, ground, placed, most=most_tried), result, before)
-        columns, rows = points.astype(int).T
-        result[rows, columns] = colours
-        bare[rows, columns] = ~seen
-        context[rows[seen], columns[seen]] = True
-        before[rows[seen], columns[seen]] = True
+        _fill(piece, labels, ground, known, hole, drawn, placed, survey, total, weight, most=most_tried)
+    shown = weight > _SHOWN
+    total /= np.maximum(weight, _SHOWN)[:, :, None]
+    sure = ground.sure
+    del ground, labels, drawn, weight  # a large photo's are much
+    _carry_rim(total, shown, pixels, sure, hole, placed)
+    result = pixels.copy()
+    filled = hole & shown
+    np.copyto(result, np.clip(total, 0, 1, out=total), where=filled[:, :, None])
+    bare = hole & ~shown
     if bare.any():
-        fill_in(result, context, bare)
+        result[bare] = 0
+        fill_in(result, known | filled, bare)
     return result, bare
 
 
@@ -75,64 +85,81 @@ def unlike(pixels: Floats, known: Mask, hole: Mask, placed: Placed) -> Mask:
     known = known & ~hole
     ground = Ground.of(pixels, known)
     found = np.zeros_like(hole)
-    for points in _pieces(hole, known, placed):
+    pieces, labels = pieces_of(hole, drawn_on(placed), placed)
+    for piece in pieces:
+        points = _points(piece, labels, hole)
         columns, rows = points.astype(int).T
-        found[rows, columns] = ~shown_elsewhere(hole_of(points, pixels, known, placed), ground, placed)
+        one = hole_of(points, pixels, known, placed, target=piece.target)
+        found[rows, columns] = ~shown_elsewhere(one, ground, placed)
     return found
 
 
-def _pieces(hole: Mask, known: Mask, placed: Placed) -> list[Array]:
-    """The hole piece by piece, pixels [L, 2] each: what hangs together, in blocks where it is large.
-
-    The blocks of a large piece come from its rim inwards, so that each has something beside it.
-    """
-    count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
-    rows, columns = np.nonzero(hole)
-    order = np.argsort(labels[rows, columns], kind="stable")
-    points = np.stack([columns, rows], 1)[order].astype(float)
-    ends = np.cumsum(np.bincount(labels[rows, columns], minlength=count)[1:])[:-1]
-    plane_from_image = np.linalg.inv(placed.image_from_plane)
-    found: list[Array] = []
-    deep = None
-    for piece in np.split(points, ends):
-        on_plane, _ = project(plane_from_image, piece)
-        numbers = nearest(placed, on_plane)
-        cells = np.flatnonzero(np.bincount(numbers, minlength=len(placed.index)))
-        if len(cells) <= _MOST_CELLS:
-            found.append(piece)
-            continue
-        blocks, block_of = np.unique(placed.index[cells] // 2, axis=0, return_inverse=True)
-        members = np.zeros(len(placed.index), np.int64)
-        members[cells] = block_of.reshape(-1)
-        members = members[numbers]
-        parts = [piece[members == block] for block in range(len(blocks))]
-        if deep is None:
-            deep = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
-        depths = [float(deep[tuple(part.astype(int).T[::-1])].mean()) for part in parts]
-        found += [parts[place] for place in np.argsort(depths, kind="stable")]
-    return found
+def _points(piece: Piece, labels: NDArray[np.int32], hole: Mask) -> Array:
+    """The pixels [L, 2] of a piece."""
+    left, top, right, bottom = piece.box
+    here = (labels[top:bottom, left:right] == piece.number) & hole[top:bottom, left:right]
+    return np.argwhere(here)[:, ::-1] + np.array([left, top], float)
 
 
-def _filled(
-    hole: Hole, ground: Ground, found: list[Source], shown: Floats, before: Mask
-) -> tuple[Floats, Mask]:
-    """The colours of a hole's pixels [L, 3], and which of them any source shows [L]."""
+def _fill(
+    piece: Piece,
+    labels: NDArray[np.int32],
+    ground: Ground,
+    known: Mask,
+    hole: Mask,
+    drawn: NDArray[np.uint8],
+    placed: Placed,
+    survey: Survey | None,
+    total: Floats,
+    weight: Floats,
+    *,
+    most: int,
+) -> None:
+    """Add a piece's colours to the total [H, W, 3], times its weight, which is added to the weight [H, W]."""
+    points = _points(piece, labels, hole)
+    one = hole_of(points, ground.pixels, known, placed, target=piece.target)
+    if piece.beyond and not one.weights.any():
+        return
+    allowed = drawn if piece.drawn else None
+    if piece.beyond:
+        allowed = 1 - drawn
+    found = sources(one, ground, placed, most=most, survey=survey, allowed=allowed)
     if not found:
-        return np.zeros((len(hole.points), 3), np.float32), np.zeros(len(hole.points), bool)
-    weights = weighed(hole, ground, found)
-    colours, weight = mixed(hole.points, ground, found, weights, sharp=True)
-    return np.clip(colours + _carried(hole, ground, found, weights, shown, before), 0, 1), weight > 1e-6
+        return
+    weights = weighed(one, ground, found)
+    radius = max(1, round(_FADING * one.spacing_px))
+    margin = radius + _RIM_PX + 1
+    height, width = hole.shape
+    left, top = max(0, piece.box[0] - margin), max(0, piece.box[1] - margin)
+    right, bottom = min(width, piece.box[2] + margin), min(height, piece.box[3] + margin)
+    window = (slice(top, bottom), slice(left, right))
+    own = labels[window] == piece.number
+    colours, sure = painted(
+        ground,
+        found,
+        weights,
+        own & hole[window],
+        corner=(left, top),
+        drawn=allowed,
+        fading_px=radius,
+    )
+    share = feathered(own, radius) * (sure > _SHOWN)
+    total[window] += colours * share[..., None]
+    weight[window] += share
 
 
 def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
+    misfits = np.array([source.misfit for source in found])
+    if not hole.weights.any():
+        return trusted(np.zeros((len(found), 0, 3)), hole.weights, misfits)
     residuals = []
     for source in found:
         at, front = source.where(hole.around)
         colours = source.gain * taken(ground.pixels, at) + source.offset
         shown = (front & ground.known(at))[:, None]
         residuals.append(np.where(shown, colours - hole.colours, 0))
-    return trusted(np.stack(residuals), hole.weights, np.array([source.misfit for source in found]))
+    return trusted(np.stack(residuals), hole.weights, misfits, share=hole.share)
 
 
 def mixed(
@@ -153,36 +180,30 @@ def mixed(
     return (total / np.maximum(weight, 1e-9)[:, None]).astype(np.float32), weight
 
 
-def _carried(
-    hole: Hole, ground: Ground, found: list[Source], weights: Array, shown: Floats, before: Mask
-) -> Floats:
-    """What the photo differs by from the sources at the hole's rim, carried to its pixels: [L, 3].
+def _carry_rim(total: Floats, shown: Mask, pixels: Floats, sure: Floats, hole: Mask, placed: Placed) -> None:
+    """Add to the fill `total` what the photo differs by from it at the hole's rim, carried inwards."""
+    centers, front = placed.centers_px()
+    _, parts, boxes, middles = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
+    height, width = hole.shape
+    for number in range(1, len(boxes)):
+        left, top, right, bottom = _around(boxes[number], _RIM_PX + 1, width, height)
+        window = (slice(top, bottom), slice(left, right))
+        inside = (parts[window] == number).astype(np.uint8)
+        rim = rim_of(inside, (sure[window] > 0) & shown[window], reach_px=_RIM_PX)
+        if not rim.any():
+            continue
+        away = np.hypot(*(centers - middles[number]).T)
+        spacing = pitch_px(placed, int(np.argmin(np.where(front, away, np.inf))))
+        off = np.zeros((*rim.shape, 3), np.float32)
+        off[rim] = pixels[window][rim] - total[window][rim]
+        lift = membrane(off, rim, spacing_px=spacing)
+        del off
+        np.add(total[window], lift, out=total[window], where=inside[..., None] > 0)
 
-    The rim is of the photo, and of what was filled `before` [H, W]; both are in `shown` [H, W, 3].
-    """
-    margin = int(np.ceil(_RIM_PX)) + 1
-    low = np.maximum(hole.points.min(0).astype(int) - margin, 0)
-    width, height = (hole.points.max(0).astype(int) + margin + 1 - low).tolist()
-    inside = np.zeros((height, width), np.uint8)
-    columns, rows = (hole.points.astype(int) - low).T
-    inside[rows, columns] = 1
-    known = np.zeros((height, width), bool)
-    window = (slice(low[1], low[1] + height), slice(low[0], low[0] + width))
-    part = (ground.sure[window] > 0) | before[window]
-    known[: part.shape[0], : part.shape[1]] = part
-    rim_rows, rim_columns = np.nonzero(rim_of(inside, known, reach_px=_RIM_PX))
-    if not len(rim_rows):
-        return np.zeros((len(hole.points), 3), np.float32)
-    colours, weight = mixed(
-        np.stack([rim_columns + low[0], rim_rows + low[1]], 1).astype(float),
-        ground,
-        found,
-        weights,
-        sharp=False,
-    )
-    compared = weight > 0.3
-    rim_rows, rim_columns = rim_rows[compared], rim_columns[compared]
-    off, rim = np.zeros((height, width, 3), np.float32), np.zeros((height, width), bool)
-    off[rim_rows, rim_columns] = shown[rim_rows + low[1], rim_columns + low[0]] - colours[compared]
-    rim[rim_rows, rim_columns] = True
-    return membrane(off, rim, spacing_px=hole.spacing_px)[rows, columns]
+
+def _around(box: NDArray, margin: int, width: int, height: int) -> tuple[int, int, int, int]:
+    left, top, wide, high = (int(value) for value in box[:4])
+    return (
+        max(0, left - margin), max(0, top - margin),
+        min(width, left + wide + margin), min(height, top + high + margin),
+    )  # fmt: skip

@@ -1,0 +1,148 @@
+"""The pieces of a hole: each hidden pixel belongs to the nearest object's cell, inside the pattern or
+beyond it.
+
+A hole of few cells is one piece: what is seen around it binds all of it together.
+
+Convention: masks bool [H, W].
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from p3i.place.moves import nearest, pitch_px
+from p3i.place.outlines import chart_of, polygons
+from p3i.place.placed import Placed
+from p3i.vision.sheet import project
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+Box = tuple[int, int, int, int]
+
+# Where cells are larger than this many pixels, only every so manyth pixel is asked whose it is.
+_FINE = 24
+_COARSEST = 8
+# So many rows are asked at a time.
+_STRIP = 256
+# A hole of as many cells is one piece.
+_FEW = 6.0
+# Pixels so near to a hole have a piece too.
+_NEAR_PX = 8
+# The pattern reaches this many pixels beyond its cells' outlines.
+_SLACK_PX = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A part of a hole, seen from one object: what lies in its cell, or a small hole of its own.
+
+    `number` is that of its pixels; `box` (left, top, right, bottom; half-open) holds them all. `drawn` is
+    whether it is a cell of the pattern: only such ground is like it. `beyond` the pattern nothing is.
+    """
+
+    number: int
+    target: int
+    drawn: bool
+    beyond: bool
+    box: Box
+
+
+def drawn_on(placed: Placed) -> NDArray[np.uint8]:
+    """Where on the photo the pattern's cells lie, 1 [H, W]."""
+    drawn = np.zeros((placed.size.height, placed.size.width), np.uint8)
+    corners = polygons(chart_of(placed.pattern), placed.index)
+    pixels, front = project(placed.image_from_plane, corners)
+    most = 4.0 * max(placed.size.width, placed.size.height)
+    for outline in pixels[front.all(1) & (np.abs(pixels) < most).all((1, 2))]:
+        cv2.fillPoly(drawn, [np.rint(outline * 16).astype(np.int32)], 1, shift=4)
+    return cv2.dilate(drawn, np.ones((2 * _SLACK_PX + 1,) * 2, np.uint8))
+
+
+def pieces_of(
+    hole: Mask, drawn: NDArray[np.uint8], placed: Placed, *, few: float = _FEW
+) -> tuple[list[Piece], NDArray[np.int32]]:
+    """The pieces, and the number of each pixel's piece [H, W], in the hole and near it; else -1.
+
+    What hangs together and is worth so `few` cells is one piece.
+    """
+    labels = np.full(hole.shape, -1, np.int32)
+    count, parts, boxes, _ = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
+    pieces: list[Piece] = []
+    for part in range(1, count):
+        left, top, right, bottom = _padded(boxes[part], hole.shape)
+        window = (slice(top, bottom), slice(left, right))
+        inside = parts[window] == part
+        found = 2 * _nearest_in((left, top, right, bottom), placed) + (drawn[window] == 0)
+        numbers, counts = np.unique(found[inside], return_counts=True)
+        if _as_many(numbers // 2, counts) <= few:
+            rows, columns = np.nonzero(inside)
+            middle = np.array([[left + columns.mean(), top + rows.mean()]])
+            target = int(nearest(placed, project(np.linalg.inv(placed.image_from_plane), middle)[0])[0])
+            found[:] = 0
+            kinds = {0: (target, False, False)}
+        else:
+            kinds = {number: (number // 2, number % 2 == 0, number % 2 == 1) for number in numbers.tolist()}
+        # What lies near two holes is the nearer's: of its own pixels, else of the first.
+        given = inside | (labels[window] < 0)
+        lasting = np.full(int(found.max()) + 1, -1, np.int32)
+        for number, (target, is_drawn, beyond) in kinds.items():
+            lasting[number] = len(pieces)
+            pieces.append(Piece(len(pieces), target, is_drawn, beyond, (0, 0, 0, 0)))
+        labels[window] = np.where(given, lasting[found], labels[window])
+        extents = _boxes(np.where(inside, labels[window], -1), left, top)
+        for number, box in extents.items():
+            pieces[number] = replace(pieces[number], box=box)
+    return pieces, labels
+
+
+def _as_many(cells: NDArray, counts: NDArray) -> float:
+    """How many cells of one size a hole is worth: slivers of further ones count as slivers."""
+    sizes = np.bincount(np.unique(cells, return_inverse=True)[1], counts)
+    return float(sizes.sum() ** 2 / (sizes**2).sum())
+
+
+def _padded(box: NDArray, shape: tuple[int, ...]) -> Box:
+    left, top, wide, high = (int(value) for value in box[:4])
+    return (
+        max(0, left - _NEAR_PX), max(0, top - _NEAR_PX),
+        min(shape[1], left + wide + _NEAR_PX), min(shape[0], top + high + _NEAR_PX),
+    )  # fmt: skip
+
+
+def _nearest_in(box: Box, placed: Placed) -> NDArray[np.int32]:
+    """The object nearest to each pixel of a box [h, w]; where cells are large, to a block of pixels."""
+    left, top, right, bottom = box
+    pixels, front = placed.centers_px()
+    middle = ((left + right) / 2, (top + bottom) / 2)
+    target = int(np.argmin(np.where(front, np.hypot(*(pixels - middle).T), np.inf)))
+    step = int(np.clip(pitch_px(placed, target) / _FINE, 1, _COARSEST))
+    plane_from_image = np.linalg.inv(placed.image_from_plane)
+    x = left + np.arange(0, right - left, step) + (step - 1) / 2
+    found = np.empty((bottom - top, right - left), np.int32)
+    for start in range(top, bottom, _STRIP):
+        stop = min(bottom, start + _STRIP)
+        y = start + np.arange(0, stop - start, step) + (step - 1) / 2
+        points = np.stack(np.meshgrid(x, y), -1)
+        numbers = nearest(placed, project(plane_from_image, points.reshape(-1, 2))[0])
+        blocks = numbers.reshape(points.shape[:2]).astype(np.int32)
+        blocks = np.repeat(np.repeat(blocks, step, 0), step, 1)
+        found[start - top : stop - top] = blocks[: stop - start, : right - left]
+    return found
+
+
+def _boxes(labels: NDArray[np.int32], left: int, top: int) -> dict[int, Box]:
+    """The box of each number that is not below 0."""
+    rows, columns = np.nonzero(labels >= 0)
+    numbers = labels[rows, columns]
+    order = np.argsort(numbers, kind="stable")
+    rows, columns, numbers = rows[order], columns[order], numbers[order]
+    starts = np.flatnonzero(np.r_[True, np.diff(numbers) > 0])
+    low = [np.minimum.reduceat(at, starts) for at in (columns, rows)]
+    high = [np.maximum.reduceat(at, starts) for at in (columns, rows)]
+    return {
+        int(number): (left + int(x0), top + int(y0), left + int(x1) + 1, top + int(y1) + 1)
+        for number, x0, y0, x1, y1 in zip(numbers[starts], *low, *high, strict=True)
+    }
