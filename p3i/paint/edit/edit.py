@@ -134,7 +134,7 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
     notes += _doubts(cut)
     own = _mask(_only(laid, old_place), cut)
     removed = covered(_only(laid, gone), cut) & (own < 0.02) & photo.valid
-    ground = cleared(photo.pixels, photo.valid, laid, covered(laid, cut))
+    ground = cleared(photo.pixels, photo.valid, laid, cut)
     pixels = np.where(removed[:, :, None], ground, photo.pixels)
     scale = options.scale
     if scale is None:
@@ -213,7 +213,7 @@ def _paint(
     old_frames, new_frames = frames(laid), frames(wanted)
     levels = Levels.of(photo.pixels)
     touched = np.zeros(photo.valid.shape, bool)
-    for number, window in enumerate(windows(wanted, cut, scale=scale)):
+    for number, window in enumerate(windows(wanted, cut.alpha, cut.step, scale=scale)):
         if window is None or not new_front[number]:
             continue
         source = int(good[np.argmin(np.hypot(*(old_px[good] - new_px[number]).T))])
