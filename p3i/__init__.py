@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         eval_set,
         examples,
         extend,
+        find_marred,
         inpaint,
         points,
         read_image,
@@ -71,6 +72,7 @@ _HOMES = {
     "format": "p3i.language",
     "Image": "p3i.vision.image",
     "inpaint": "p3i.api",
+    "find_marred": "p3i.api",
     "InpaintOptions": "p3i.options.inpaint",
     "load": "p3i.language",
     "load_sketch": "p3i.language",
@@ -108,7 +110,8 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "synth_all", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score",
+    "synth", "synth_all", "show", "render", "rectify", "tile", "points", "inpaint", "find_marred", "extend",
+    "edit", "score",
     "check", "format", "expand", "examples", "trace", "eval_set", "load", "load_sketch", "loads", "dump",
     "dumps", "read_image", "Program", "Sketch", "Diagnostic", "Image", "Size", "Camera", "SearchConfig",
     "SynthesisResult", "Candidate", "Other", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions",

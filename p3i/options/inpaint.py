@@ -39,6 +39,12 @@ class InpaintOptions:
         str, "With npn: where the network runs: auto, cpu, cuda, ...", Spelt(metavar="NAME")
     ] = "auto"
     threads: Annotated[int, "With npn: threads of the network.", Spelt(metavar="N")] = 1
+    only_pattern: Annotated[
+        bool,
+        "Leave transparent what cannot come from the pattern: where it shows nothing alike, and where its "
+        "objects differ so much from one another that any fill is a guess.",
+        Spelt("--only-pattern"),
+    ] = False
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:

@@ -42,8 +42,8 @@ def test_the_facts_go_to_a_file_and_the_picture_elsewhere(folder: Path) -> None:
     assert (folder / "out.png").exists()
 
 
-def test_several_objects_are_removed_at_once(folder: Path) -> None:
-    words = ["--remove", "0,0", "--remove", "D6"]
+def test_several_objects_are_restored_at_once(folder: Path) -> None:
+    words = ["--restore", "0,0", "--restore", "D6"]
     assert run(["inpaint", "photo.png", "grid.p3p", *words, "-o", "out.png", "-q"]) == 0
     before, after = (read_image(folder / name).pixels for name in ("photo.png", "out.png"))
     columns = np.flatnonzero((before != after).any((0, 2)))
@@ -51,7 +51,7 @@ def test_several_objects_are_removed_at_once(folder: Path) -> None:
 
 
 def test_a_jpeg_says_that_it_stores_all_anew(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["inpaint", "photo.png", "grid.p3p", "--remove", "0,0", "-o", "out.jpg"]) == 0
+    assert run(["inpaint", "photo.png", "grid.p3p", "--restore", "0,0", "-o", "out.jpg"]) == 0
     assert "JPG stores every pixel anew" in capsys.readouterr().err
 
 
@@ -59,10 +59,10 @@ def test_a_jpeg_says_that_it_stores_all_anew(folder: Path, capsys: pytest.Captur
     ("words", "code", "said"),
     [
         (["--mask", "no.png"], 3, "there is no file no.png"),
-        (["--remove", "Z99"], 2, "there is no object Z99"),
+        (["--restore", "Z99"], 2, "there is no object Z99"),
         ([], 2, "nothing is to be filled"),
-        (["--remove", "0,0", "--time", "5"], 2, "--time belongs to the method npn"),
-        (["--remove", "0,0", "--steps", "0"], 2, "at least one step"),
+        (["--restore", "0,0", "--time", "5"], 2, "--time belongs to the method npn"),
+        (["--restore", "0,0", "--steps", "0"], 2, "at least one step"),
         (["--mask", "photo.png"], 3, "colours"),
     ],
 )
@@ -76,6 +76,6 @@ def test_what_cannot_be_filled_is_refused_by_name(
 
 def test_a_file_that_exists_is_not_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "out.png").write_bytes(b"mine")
-    assert run(["inpaint", "photo.png", "grid.p3p", "--remove", "0,0", "-o", "out.png"]) == 3
+    assert run(["inpaint", "photo.png", "grid.p3p", "--restore", "0,0", "-o", "out.png"]) == 3
     assert "--force" in capsys.readouterr().err
     assert (folder / "out.png").read_bytes() == b"mine"

@@ -87,15 +87,15 @@ def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> A
     return (points - frame[:2, 2]) @ frame[:2, :2]
 
 
-def object_masks(
-    placed: Placed, cut: Cutout, layer: Floats | None = None
-) -> Iterator[tuple[tuple[slice, slice], Floats]]:
-    """For each object in sight its window and `cut.alpha`, or another `layer`, as it is seen: [h, w(, C)]."""
-    shown = cut.alpha if layer is None else layer
+def object_masks(placed: Placed, layer: Floats, step: float) -> Iterator[tuple[tuple[slice, slice], Floats]]:
+    """For each object in sight its window, and a `layer` of its cell's grid as it is seen: [h, w(, C)].
+
+    `step` is the grid's, in program units.
+    """
     plane_from_image = np.linalg.inv(placed.image_from_plane)
-    grid_from_local = np.diag([1 / cut.step, 1 / cut.step, 1.0])
-    grid_from_local[:2, 2] = (shown.shape[0] - 1) / 2
-    for frame, window in zip(frames(placed), windows(placed, shown, cut.step), strict=True):
+    grid_from_local = np.diag([1 / step, 1 / step, 1.0])
+    grid_from_local[:2, 2] = (layer.shape[0] - 1) / 2
+    for frame, window in zip(frames(placed), windows(placed, layer, step), strict=True):
         if window is None:
             continue
         rows, columns = window
@@ -105,13 +105,13 @@ def object_masks(
         size = (columns.stop - columns.start, rows.stop - rows.start)
         # Beyond the grid nothing lies: the border is 0.
         how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        yield window, np.asarray(cv2.warpPerspective(shown, matrix, size, flags=how), np.float32)
+        yield window, np.asarray(cv2.warpPerspective(layer, matrix, size, flags=how), np.float32)
 
 
 def covered(placed: Placed, cut: Cutout) -> Mask:
     """The pixels that objects cover, with all that goes with them: [H, W]."""
     mask = np.zeros((placed.size.height, placed.size.width), bool)
-    for window, gone in object_masks(placed, cut, cut.gone):
+    for window, gone in object_masks(placed, cut.gone, cut.step):
         mask[window] |= gone > _LEAST_ALPHA
     return mask
 
@@ -164,7 +164,7 @@ def _expected(placed: Placed, cut: Cutout) -> tuple[Floats, Mask]:
     # How far inside its cell a place lies, from 0 a little beyond its border: the deepest cell has the pixel.
     inside = np.clip(cut.own + _BEYOND, 0, None).astype(np.float32)
     layers = np.concatenate([cut.ground, inside[:, :, None]], 2)
-    for window, layer in object_masks(placed, cut, layers):
+    for window, layer in object_masks(placed, layers, cut.step):
         deeper = layer[:, :, 3] > deepest[window]
         np.copyto(shown[window], layer[:, :, :3], where=deeper[:, :, None])
         np.copyto(deepest[window], layer[:, :, 3], where=deeper)
@@ -174,7 +174,7 @@ def _expected(placed: Placed, cut: Cutout) -> tuple[Floats, Mask]:
 def _gain(pixels: Floats, expected: Floats, ground: Mask, *, sigma: float) -> Floats:
     """How much lighter the photo's ground is than what is expected, smooth over `sigma` pixels: [H, W, 3]."""
     here, there = (_even(each, ground, sigma=sigma) for each in (pixels, expected))
-    return np.clip((here + 0.02) / (there + 0.02), *_GAINS)
+    return np.clip((here + 0.02) / (there + 0.02), *_GAINS).astype(np.float32)
 
 
 def _even(values: Floats, ground: Mask, *, sigma: float) -> Floats:

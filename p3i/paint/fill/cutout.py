@@ -60,6 +60,10 @@ _LEAST_PART = 6
 _LOOSE_SHARE = 0.15
 # Where no object stands out, the middle of the cell is taken for it, this far, in distances.
 _ASSUMED = 0.36
+# Where edits of photos looked good, the ground was more even than this, and objects more alike; where objects
+# leave less room than this up to their cell's border, the ground must be more even still.
+_MOST_UNEVEN, _MOST_UNLIKE = 0.35, 0.6
+_LEAST_ROOM, _MOST_UNEVEN_THERE = 0.06, 0.17
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,8 +96,8 @@ class Cutout:
     cell without that, `own` [side, side] how far inside its own cell a place lies, in distances.
 
     `room` is how much ground lies between it and the cell's border, where they are closest, in distances.
-    `uneven` is how much the ground at that border differs from place to place, as a share of the difference
-    between object and ground; `unlike` how far a typical object is from the median cell, as a share of the
+    `uneven` is how far the cell's ground lies from what its border tells of it, as a share of how far the
+    object does; `unlike` how far a typical object is from the median cell, as a share of the
     contrast within that.
 
     `step` is the grid's distance in program units; `mean` [side, side, 3] the median cell; `misfit` [M] how
@@ -131,14 +135,57 @@ class Cutout:
         return taken(self.alpha if layer is None else layer, at) * inside
 
 
-def cutout(placed: Placed, photo: Image) -> Cutout:
-    """The object that the cells of `placed` on its straight photo have in common."""
-    chart = chart_of(placed.pattern)
-    spacing = pitch(chart)
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampled:
+    """The cells of all objects as the photo has them: `cells` [M, side, side, 3], `seen` [M, side, side].
+
+    `own` [side, side] is how far inside its own cell a place lies, in distances, `step` that of places in
+    program units, `places` how many there are from an object to the next.
+    """
+
+    cells: Floats
+    seen: Mask
+    own: Array
+    step: float
+    places: float
+
+
+def sampled_cells(placed: Placed, photo: Image) -> Sampled:
+    """The cells of all objects of a straight photo."""
+    spacing = pitch(chart_of(placed.pattern))
+    local, step = _grid(spacing)
+    cells, seen = _cells(placed, photo, local)
+    shape = (len(cells), _SIDE, _SIDE)
+    own = _own_ground(placed, local, spacing)
+    return Sampled(cells.reshape(*shape, 3), seen.reshape(shape), own, step, spacing / step)
+
+
+def _grid(spacing: float) -> tuple[Array, float]:
+    """The grid's places [K, 2] about an object, in program units, and how far they are apart."""
     half = (_SIDE - 1) // 2
     step = _REACH * spacing / half
     line = (np.arange(_SIDE) - half) * step
-    local: Array = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2).astype(np.float64)
+    return np.stack(np.meshgrid(line, line), -1).reshape(-1, 2).astype(np.float64), step
+
+
+def doubts(cut: Cutout) -> list[str]:
+    """A sentence where what was cut out, or the ground that replaces it, is not to be relied on."""
+    if not cut.clear:
+        return ["no object stands out from the ground of its cell: the middle of the cell is taken for it"]
+    why: list[str] = []
+    if cut.uneven > _MOST_UNEVEN:
+        why.append("there is no even ground between the objects")
+    elif cut.room < _LEAST_ROOM and cut.uneven > _MOST_UNEVEN_THERE:
+        why.append("the objects reach to their cells' borders")
+    if cut.unlike > _MOST_UNLIKE:
+        why.append("the objects differ much from one another")
+    return [f"look at the result: {', and '.join(why)}, so pieces of others may show"] if why else []
+
+
+def cutout(placed: Placed, photo: Image) -> Cutout:
+    """The object that the cells of `placed` on its straight photo have in common."""
+    spacing = pitch(chart_of(placed.pattern))
+    local, step = _grid(spacing)
     own = _own_ground(placed, local, spacing)
     cells, seen = _cells(placed, photo, local)
     whole = seen[:, own.ravel() > 0].mean(1) > 0.98
@@ -154,7 +201,9 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     misfit = np.where(whole, apart[:, own.ravel() > 0].mean(1), np.inf)
     straight = Straight.of(placed, side=_SIDE, step=step)
     flat, flat_own = straight.laid(mean), straight.laid(own.astype(np.float32))
-    found = _segmented(flat, straight.laid(spread.transpose(1, 2, 0)).mean(2), flat_own, straight.directions)
+    apart, found = _segmented(
+        flat, straight.laid(spread.transpose(1, 2, 0)).mean(2), flat_own, straight.directions
+    )
     clear = found is not None
     if found is None:
         reach = np.hypot(local[:, 0], local[:, 1]).reshape(_SIDE, _SIDE)
@@ -170,18 +219,18 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     alpha = (straight.bent(thing) * within).astype(np.float32)
     gone = (straight.bent(with_it.astype(np.float32)) * within).astype(np.float32)
     room = max(0.0, float(own[alpha > 0.5].min(initial=0.5)))
-    uneven = _unevenness(mean, alpha > 0.5, own)
+    uneven = _unevenness(apart, thing, with_it, flat_own)
     contrast = float(mean[own > 0].std(axis=0).mean())
     unlike = float(np.median(misfit[whole])) / max(contrast, 1e-6) if whole.sum() > 1 else 0.0
     return Cutout(alpha, gone, mean, ground, own, step, misfit, clear, room, uneven, unlike)
 
 
-def _unevenness(mean: Floats, thing: Mask, own: Array) -> float:
-    """The spread of the ground's colour at the cell's border over its distance from the object's (Lab)."""
-    colours = lab_of(mean)
-    ground = colours[(own > -_BORDER) & (own < _BORDER)]
-    apart = float(np.linalg.norm(colours[thing].mean(0) - ground.mean(0))) if thing.any() else 0.0
-    return float(np.linalg.norm(ground.std(0))) / max(apart, 1e-6)
+def _unevenness(apart: Array, thing: Floats, with_it: Mask, own: Floats) -> float:
+    """How far a cell's ground lies from what its border tells of it, over how far its object does."""
+    ground, inside = (own > 0) & ~with_it, thing > 0.5
+    if not ground.any() or not inside.any():
+        return 0.0
+    return float(apart[ground].mean()) / max(float(apart[inside].mean()), 1e-6)
 
 
 def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:
@@ -234,10 +283,12 @@ def _evened(cells: Floats, seen: Mask, chosen: NDArray[np.int64]) -> Floats:
     return cells * np.clip(gain, 0.4, 2.5)[:, None].astype(np.float32)
 
 
-def _segmented(mean: Floats, spread: Floats, own: Floats, directions: Array) -> tuple[Floats, Mask] | None:
-    """How much each place of the median cell is object, and what goes with it, both [side, side].
+def _segmented(
+    mean: Floats, spread: Floats, own: Floats, directions: Array
+) -> tuple[Array, tuple[Floats, Mask] | None]:
+    """How far each place of the median cell lies from what its border tells of it, in Lab: [side, side].
 
-    None where nothing stands out from the ground.
+    And how much of it is object, and what goes with that; None where nothing stands out from the ground.
     """
     ground = (own > -_BORDER) & (own < _BORDER)
     inner = own > 0
@@ -254,14 +305,14 @@ def _segmented(mean: Floats, spread: Floats, own: Floats, directions: Array) -> 
     noise = max(float(np.median(under[ground])), 100 * float(np.median(spread[ground])))
     level = _divide(apart[inner])
     if level < max(_LEAST_CONTRAST, _DEVIATIONS * noise):
-        return None
+        return apart, None
     core = ((apart > level) & inner).astype(np.uint8)
     core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
     places = own.shape[0] / (2 * _REACH)  # of the grid, from one object to the next
     whole = _hull(_loose(core, own * places)) & inner
     share = float(whole.sum() / inner.sum())
     if not _LEAST_SHARE <= share <= _MOST_SHARE:
-        return None
+        return apart, None
     # Where cells differ beside an object its edge slips.
     differs = np.maximum(apart, _SLIPPED * 100 * spread)
     seen = (differs > max(_JUST_SEEN, _SEEN_DEVIATIONS * noise)) & inner
@@ -269,7 +320,8 @@ def _segmented(mean: Floats, spread: Floats, own: Floats, directions: Array) -> 
     seen &= cv2.dilate(whole.astype(np.uint8), _disc(_HANGS_ON * places)) > 0
     labels = cv2.connectedComponents((seen | whole).astype(np.uint8), connectivity=4)[1]
     with_it = np.isin(labels, np.unique(labels[whole])) & (labels > 0)
-    return np.asarray(cv2.GaussianBlur(whole.astype(np.float32), (0, 0), 0.8), np.float32), with_it
+    soft = np.asarray(cv2.GaussianBlur(whole.astype(np.float32), (0, 0), 0.8), np.float32)
+    return apart, (soft, with_it)
 
 
 def _smoothed_over(colours: Floats, ground: Mask) -> Array:

@@ -78,7 +78,7 @@ def through(values: Floats, known: Mask, wanted: Mask, directions: Array) -> Flo
     drawn = np.zeros((len(rows), values.shape[2]))
     for direction in directions:
         ends = _ends(detail, known, places, direction)
-        both = (ends.seen[0] & ends.seen[1] & np.isfinite(ends.near).all(0)[:, None])[:, :, None]
+        both = (ends.seen[0] & ends.seen[1] & np.isfinite(ends.near.max(axis=0))[:, None])[:, :, None]
         one, other = ends.profile * both
         energy = (_NEAR * (one**2 + other**2) / 2).sum((1, 2))
         apart = (_NEAR * (one - other) ** 2 / 2).sum((1, 2))
