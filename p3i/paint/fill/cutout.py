@@ -46,6 +46,8 @@ _LEAST_SHARE, _MOST_SHARE = 0.01, 0.92
 # Ground that runs on straight must leave this share at most of what a smooth one leaves unexplained, to be
 # believed: along one direction, along several at once.
 _STRAIGHT, _CROSSED = 0.8, 0.5
+_FAINT = 0.5  # in Lab: less than this is explained by any
+_TOLD = 0.6  # of a cell, at least, is ground
 # What hangs on an object and differs from its ground by so much goes with it: the least that an eye sees, in
 # Lab (Mahy, van Eycken and Oosterlinck, Color Research and Application 1994), and so many deviations.
 _JUST_SEEN = 2.3
@@ -96,8 +98,8 @@ class Cutout:
     cell without that, `own` [side, side] how far inside its own cell a place lies, in distances.
 
     `room` is how much ground lies between it and the cell's border, where they are closest, in distances.
-    `uneven` is how far the cell's ground lies from what its border tells of it, as a share of how far the
-    object does; `unlike` how far a typical object is from the median cell, as a share of the
+    `uneven` is how much the ground at that border differs from place to place, but along the direction that it
+    runs in, as a share of the difference between object and ground; `unlike` how far a typical object is from the median cell, as a share of the
     contrast within that.
 
     `step` is the grid's distance in program units; `mean` [side, side, 3] the median cell; `misfit` [M] how
@@ -201,7 +203,7 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     misfit = np.where(whole, apart[:, own.ravel() > 0].mean(1), np.inf)
     straight = Straight.of(placed, side=_SIDE, step=step)
     flat, flat_own = straight.laid(mean), straight.laid(own.astype(np.float32))
-    apart, found = _segmented(
+    along, found = _segmented(
         flat, straight.laid(spread.transpose(1, 2, 0)).mean(2), flat_own, straight.directions
     )
     clear = found is not None
@@ -213,24 +215,39 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     slip = _disc(_SLIP * spacing / step)
     with_it = (cv2.dilate(with_it.astype(np.uint8), slip) > 0) & (flat_own > 0)
     known = (flat_own > -_BORDER) & ~with_it
-    ground = straight.bent(through(flat, known, with_it, straight.directions))
+    # Lines go on, and where all of the ground runs along one direction, it does so under the object.
+    flat_ground = through(flat, known, with_it, straight.directions)
+    if along is not None:
+        flat_ground = np.where(with_it[:, :, None], continued(flat, known, along[None])[1], flat_ground)
+    ground = straight.bent(flat_ground)
     # A soft edge, two places wide, within the cell.
     within = np.clip(own * spacing / step + 1, 0, 1)
     alpha = (straight.bent(thing) * within).astype(np.float32)
     gone = (straight.bent(with_it.astype(np.float32)) * within).astype(np.float32)
     room = max(0.0, float(own[alpha > 0.5].min(initial=0.5)))
-    uneven = _unevenness(apart, thing, with_it, flat_own)
+    uneven = _unevenness(flat, thing, flat_own, along)
     contrast = float(mean[own > 0].std(axis=0).mean())
     unlike = float(np.median(misfit[whole])) / max(contrast, 1e-6) if whole.sum() > 1 else 0.0
     return Cutout(alpha, gone, mean, ground, own, step, misfit, clear, room, uneven, unlike)
 
 
-def _unevenness(apart: Array, thing: Floats, with_it: Mask, own: Floats) -> float:
-    """How far a cell's ground lies from what its border tells of it, over how far its object does."""
-    ground, inside = (own > 0) & ~with_it, thing > 0.5
-    if not ground.any() or not inside.any():
-        return 0.0
-    return float(apart[ground].mean()) / max(float(apart[inside].mean()), 1e-6)
+def _unevenness(mean: Floats, thing: Floats, own: Floats, along: Array | None) -> float:
+    """The spread of the ground's colour at the cell's border over its distance from the object's (Lab).
+
+    What runs `along` a direction [2] through all of the cell is even.
+    """
+    colours = lab_of(mean)
+    rows, columns = np.nonzero((own > -_BORDER) & (own < _BORDER))
+    ground, inside = colours[rows, columns], thing > 0.5
+    apart = float(np.linalg.norm(colours[inside].mean(0) - ground.mean(0))) if inside.any() else 0.0
+    if along is not None:
+        step = along / np.hypot(*along)
+        strip = np.rint(columns * step[1] - rows * step[0]).astype(int)
+        strip -= strip.min()
+        count = np.maximum(np.bincount(strip), 1)
+        means = np.stack([np.bincount(strip, channel) / count for channel in ground.T], 1)
+        ground = ground - means[strip]
+    return float(np.linalg.norm(ground.std(0))) / max(apart, 1e-6)
 
 
 def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:
@@ -285,34 +302,36 @@ def _evened(cells: Floats, seen: Mask, chosen: NDArray[np.int64]) -> Floats:
 
 def _segmented(
     mean: Floats, spread: Floats, own: Floats, directions: Array
-) -> tuple[Array, tuple[Floats, Mask] | None]:
-    """How far each place of the median cell lies from what its border tells of it, in Lab: [side, side].
+) -> tuple[Array | None, tuple[Floats, Mask] | None]:
+    """How much each place of the median cell is object, and what goes with it, both [side, side].
 
-    And how much of it is object, and what goes with that; None where nothing stands out from the ground.
+    None where nothing stands out from the ground. First the direction [2] along which the ground runs, if any.
     """
     ground = (own > -_BORDER) & (own < _BORDER)
     inner = own > 0
     colours = lab_of(mean)
     ways = [np.sqrt(((colours - under) ** 2).sum(2)) for under in continued(colours, ground, directions)]
     ways.append(np.minimum.reduce(ways))
-    costs = [
-        float(way[inner].mean()) / share
-        for way, share in zip(ways, (1.0, *[_STRAIGHT] * len(directions), _CROSSED), strict=True)
-    ]
-    apart = ways[int(np.argmin(costs))]
+    # By the places that are told best: the object tells nothing of its ground.
+    most = int(_TOLD * inner.sum())
+    told = [np.sort(way[inner])[:most].mean() + _FAINT for way in ways]
+    shares = (1.0, *[_STRAIGHT] * len(directions), _CROSSED)
+    costs = [float(one) / share for one, share in zip(told, shares, strict=True)]
+    best = int(np.argmin(costs))
+    apart, along = ways[best], directions[best - 1] if 0 < best <= len(directions) else None
     under = _smoothed_over(colours, ground)
     # Ground that differs much within the border, or from cell to cell, is none.
     noise = max(float(np.median(under[ground])), 100 * float(np.median(spread[ground])))
     level = _divide(apart[inner])
     if level < max(_LEAST_CONTRAST, _DEVIATIONS * noise):
-        return apart, None
+        return along, None
     core = ((apart > level) & inner).astype(np.uint8)
     core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
     places = own.shape[0] / (2 * _REACH)  # of the grid, from one object to the next
     whole = _hull(_loose(core, own * places)) & inner
     share = float(whole.sum() / inner.sum())
     if not _LEAST_SHARE <= share <= _MOST_SHARE:
-        return apart, None
+        return along, None
     # Where cells differ beside an object its edge slips.
     differs = np.maximum(apart, _SLIPPED * 100 * spread)
     seen = (differs > max(_JUST_SEEN, _SEEN_DEVIATIONS * noise)) & inner
@@ -321,7 +340,7 @@ def _segmented(
     labels = cv2.connectedComponents((seen | whole).astype(np.uint8), connectivity=4)[1]
     with_it = np.isin(labels, np.unique(labels[whole])) & (labels > 0)
     soft = np.asarray(cv2.GaussianBlur(whole.astype(np.float32), (0, 0), 0.8), np.float32)
-    return apart, (soft, with_it)
+    return along, (soft, with_it)
 
 
 def _smoothed_over(colours: Floats, ground: Mask) -> Array:

@@ -26,7 +26,9 @@ _MIDDLE = len(_ACROSS) // 2
 # The middle of a profile counts most: of two lines that cross, each is drawn where it runs.
 _NEAR = np.exp(-(_ACROSS**2) / (2 * 1.5**2))[:, None]
 # Detail is what differs from a mean over so many places.
-_EVEN = 6.0
+_EVEN = 2.5
+# A line is as strong as this share of all detail that is known, at least; fainter ones count as less.
+_LEAST_LINE = 0.5
 # A membrane is stretched by means over so many places, again and again.
 _MEMBRANE = (7,) * 30 + (3,) * 90
 
@@ -74,6 +76,7 @@ def through(values: Floats, known: Mask, wanted: Mask, directions: Array) -> Flo
     even = np.where(known[:, :, None], even / np.maximum(weight, 1e-4), 0).astype(np.float32)
     detail = np.where(known[:, :, None], values - even, 0).astype(np.float32)
     places = np.stack([columns, rows], 1).astype(float)
+    typical = _LEAST_LINE * float((detail[known] ** 2).sum(1).mean()) * float(_NEAR.sum()) + 1e-9
     strongest, share = np.zeros(len(rows)), np.zeros(len(rows))
     drawn = np.zeros((len(rows), values.shape[2]))
     for direction in directions:
@@ -86,7 +89,7 @@ def through(values: Floats, known: Mask, wanted: Mask, directions: Array) -> Flo
         alike = np.clip(1 - 2 * apart / np.maximum(energy, 1e-12), 0, 1)
         worth = alike * energy
         better = worth > strongest
-        strongest[better], share[better] = worth[better], alike[better]
+        strongest[better], share[better] = worth[better], (alike * energy / (energy + typical))[better]
         drawn[better] = _between(ends)[better]
     base = _smooth(even, known)[rows, columns]
     lines = share[:, None]
