@@ -98,9 +98,9 @@ class Cutout:
     cell without that, `own` [side, side] how far inside its own cell a place lies, in distances.
 
     `room` is how much ground lies between it and the cell's border, where they are closest, in distances.
-    `uneven` is how much the ground at that border differs from place to place, but along the direction that it
-    runs in, as a share of the difference between object and ground; `unlike` how far a typical object is from the median cell, as a share of the
-    contrast within that.
+    `uneven` is how much the ground at that border differs from place to place, but along the direction that
+    it runs in, as a share of the difference between object and ground; `unlike` how far a typical object is
+    from the median cell, as a share of the contrast within that.
 
     `step` is the grid's distance in program units; `mean` [side, side, 3] the median cell; `misfit` [M] how
     far each object of the program is from it, inf for those not seen wholly. `clear` says whether the object
@@ -305,7 +305,7 @@ def _segmented(
 ) -> tuple[Array | None, tuple[Floats, Mask] | None]:
     """How much each place of the median cell is object, and what goes with it, both [side, side].
 
-    None where nothing stands out from the ground. First the direction [2] along which the ground runs, if any.
+    None where nothing stands out. First the direction [2] along which the ground runs, if it does.
     """
     ground = (own > -_BORDER) & (own < _BORDER)
     inner = own > 0

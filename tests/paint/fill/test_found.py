@@ -21,7 +21,7 @@ def place_of(text: str, photo: Image, number: int) -> np.ndarray:
 def stained(text: str, number: int) -> tuple[Image, np.ndarray]:
     """A photo with a brown blot beside an object, and where the blot is."""
     photo = drawn(text)
-    x, y = place_of(text, photo, number) + (6, 4)
+    x, y = place_of(text, photo, number) + np.array([6, 4])
     rows, columns = np.mgrid[: photo.size.height, : photo.size.width]
     blot = np.hypot(columns - x, (rows - y) * 1.4) < 11
     pixels = np.where(blot[..., None], np.float32((0.35, 0.2, 0.1)), photo.pixels)
@@ -86,7 +86,7 @@ def test_where_objects_differ_from_one_another_a_fill_is_said_to_be_a_guess() ->
 def test_what_runs_into_a_hole_is_told_and_each_hole_has_its_own_facts() -> None:
     photo, blot = stained(LATTICE, 31)
     rows, columns = np.mgrid[: photo.size.height, : photo.size.width]
-    x, y = place_of(LATTICE, photo, 31) + (6, 4)
+    x = place_of(LATTICE, photo, 31)[0] + 6
     half = blot & (columns > x + 2)
     far = np.hypot(*(np.stack([columns, rows], -1) - place_of(LATTICE, photo, 10)).transpose(2, 0, 1)) < 6
     found = inpaint(photo, loads(LATTICE), mask=half | far)

@@ -1,4 +1,4 @@
-"""Objects taken away: the ground goes on under them as the gaps between objects show it, lines straight on."""
+"""Objects taken away: the ground goes on under them as the gaps show it, lines straight on."""
 
 import numpy as np
 import pytest
