@@ -12,7 +12,7 @@ from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
 from p3i.options.extend import ExtendOptions
-from p3i.options.inpaint import InpaintOptions
+from p3i.options.inpaint import FindOptions, InpaintOptions
 from p3i.options.points import PointsOptions
 from p3i.options.rectify import RectifyOptions
 from p3i.options.render import RenderOptions
@@ -198,21 +198,23 @@ def inpaint(
 def find_marred(
     photo: "str | os.PathLike[str] | Image",
     program: Program | str | os.PathLike[str] | None = None,
+    options: FindOptions | None = None,
     *,
-    focal_mm: float | None = None,
     config: SearchConfig | None = None,
     progress: Progress | None = None,
+    **changes: Any,
 ) -> "Marred":
     """What of the pattern on `photo` differs from all other cells: a stain, a broken tile, a sign in front.
 
-    Nothing is filled. The result has `mask` (bool [H, W], for `inpaint`), `mars`, `overlay()`, `save(path)`,
-    `record()` and `notes`. Raises FileError, ParseError, UsageError where too few cells are seen,
-    ProgramError for a program without objects on the photo, and NoPatternError.
+    Nothing is filled. `changes` are fields of FindOptions. The result has `mask` (bool [H, W], for `inpaint`),
+    `mars`, `overlay()`, `save(path)`, `record()` and `notes`. Raises FileError, ParseError, UsageError where
+    too few cells are seen, ProgramError for a program without objects on the photo, and NoPatternError.
     """
+    asked = changed(options or FindOptions(), changes, verb="find_marred")
     from p3i.paint.fill.found import find_marred as look
 
     image, found = photo_and_program(photo, program, config, progress=progress)
-    return look(image, found, focal_mm=focal_mm)
+    return look(image, found, focal_mm=asked.focal_mm)
 
 
 def extend(

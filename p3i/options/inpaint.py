@@ -17,6 +17,16 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FindOptions:
+    """How to look for what is marred. Raises UsageError for a value out of range."""
+
+    focal_mm: PhotoFocal = None
+
+    def __post_init__(self) -> None:
+        check_focal(self.focal_mm)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InpaintOptions:
     """How to fill a hole. Raises UsageError for a value out of range."""
 
