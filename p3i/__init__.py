@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         eval_set,
         examples,
         extend,
+        find_marred,
         inpaint,
         points,
         read_image,
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
     from p3i.options.edit import EditOptions
     from p3i.options.extend import ExtendOptions, Margins, parse_margins
-    from p3i.options.inpaint import InpaintOptions
+    from p3i.options.inpaint import FindOptions, InpaintOptions
     from p3i.options.points import PointsOptions
     from p3i.options.rectify import CellSize, RectifyOptions, parse_cell
     from p3i.options.render import RenderOptions
@@ -71,7 +72,9 @@ _HOMES = {
     "format": "p3i.language",
     "Image": "p3i.vision.image",
     "inpaint": "p3i.api",
+    "find_marred": "p3i.api",
     "InpaintOptions": "p3i.options.inpaint",
+    "FindOptions": "p3i.options.inpaint",
     "load": "p3i.language",
     "load_sketch": "p3i.language",
     "loads": "p3i.language",
@@ -108,11 +111,13 @@ _HOMES = {
 }
 
 __all__ = [  # noqa: RUF022  # in the order of use
-    "synth", "synth_all", "show", "render", "rectify", "tile", "points", "inpaint", "extend", "edit", "score",
+    "synth", "synth_all", "show", "render", "rectify", "tile", "points", "inpaint", "find_marred", "extend",
+    "edit", "score",
     "check", "format", "expand", "examples", "trace", "eval_set", "load", "load_sketch", "loads", "dump",
     "dumps", "read_image", "Program", "Sketch", "Diagnostic", "Image", "Size", "Camera", "SearchConfig",
     "SynthesisResult", "Candidate", "Other", "StopReason", "RenderOptions", "PointsOptions", "ShowOptions",
-    "RectifyOptions", "TileOptions", "InpaintOptions", "ExtendOptions", "EditOptions", "CellSize",
+    "RectifyOptions", "TileOptions", "InpaintOptions", "FindOptions", "ExtendOptions",
+    "EditOptions", "CellSize",
     "parse_cell", "Margins", "parse_margins", "P3IError", "UsageError", "FileError", "ProgramError",
     "ParseError", "NoPatternError",
 ]  # fmt: skip

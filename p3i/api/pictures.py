@@ -12,7 +12,7 @@ from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
 from p3i.options.extend import ExtendOptions
-from p3i.options.inpaint import InpaintOptions
+from p3i.options.inpaint import FindOptions, InpaintOptions
 from p3i.options.points import PointsOptions
 from p3i.options.rectify import RectifyOptions
 from p3i.options.render import RenderOptions
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from p3i.paint.draw.render import RenderedPicture
     from p3i.paint.edit.edit import Edited
     from p3i.paint.edit.extend import Extended
+    from p3i.paint.fill.found import Marred
     from p3i.paint.fill.inpaint import Inpainted
     from p3i.paint.straight.rectify import Rectified
     from p3i.paint.straight.tile import Tile
@@ -167,6 +168,7 @@ def inpaint(
     options: InpaintOptions | None = None,
     *,
     mask: "str | os.PathLike[str] | np.ndarray | None" = None,
+    restore: Sequence[str | tuple[int, int]] = (),
     remove: Sequence[str | tuple[int, int]] = (),
     config: SearchConfig | None = None,
     progress: Progress | None = None,
@@ -175,9 +177,10 @@ def inpaint(
     """`photo` with a hole filled by `program`, or by the one that `synth` finds outside of the hole.
 
     The hole is what `mask` marks (a picture whose white is to be filled, or bool [H, W]) and the cells of the
-    objects in `remove`, by name or (i, j); without either what is transparent. `changes` are fields of
-    InpaintOptions. The result has `pixels`, `paint()`, `save(path)`, `unlike` and `notes`. Raises FileError,
-    ParseError, UsageError, ProgramError for a program without objects on the photo, and NoPatternError.
+    objects to `restore`, by name or (i, j); objects to `remove` are taken away, ground goes on under them.
+    Without any of these the hole is what is transparent. `changes` are fields of InpaintOptions. The result
+    has `pixels`, `paint()`, `save(path)`, `unlike`, `holes` and `notes`. Raises FileError, ParseError,
+    UsageError, ProgramError for a program without objects on the photo, and NoPatternError.
     """
     asked = changed(options or InpaintOptions(), changes, verb="inpaint")
     from p3i.paint.fill.inpaint import inpaint as fill
@@ -189,7 +192,29 @@ def inpaint(
         mask = read_mask(mask, image.size)  # once: it may come from standard input, and is needed twice
     seen = without(image, mask=mask, roi=None) if program is None else image
     _, found = photo_and_program(seen, program, config, progress=progress)
-    return fill(image, found, asked, mask=mask, remove=remove, progress=progress)
+    return fill(image, found, asked, mask=mask, restore=restore, remove=remove, progress=progress)
+
+
+def find_marred(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None = None,
+    options: FindOptions | None = None,
+    *,
+    config: SearchConfig | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> "Marred":
+    """What of the pattern on `photo` differs from all other cells: a stain, a broken tile, a sign in front.
+
+    Nothing is filled. `changes` are fields of FindOptions. The result has `mask` (bool [H, W], for `inpaint`),
+    `mars`, `overlay()`, `save(path)`, `record()` and `notes`. Raises FileError, ParseError, UsageError where
+    too few cells are seen, ProgramError for a program without objects on the photo, and NoPatternError.
+    """
+    asked = changed(options or FindOptions(), changes, verb="find_marred")
+    from p3i.paint.fill.found import find_marred as look
+
+    image, found = photo_and_program(photo, program, config, progress=progress)
+    return look(image, found, focal_mm=asked.focal_mm)
 
 
 def extend(

@@ -17,6 +17,16 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FindOptions:
+    """How to look for what is marred. Raises UsageError for a value out of range."""
+
+    focal_mm: PhotoFocal = None
+
+    def __post_init__(self) -> None:
+        check_focal(self.focal_mm)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InpaintOptions:
     """How to fill a hole. Raises UsageError for a value out of range."""
 
@@ -39,6 +49,12 @@ class InpaintOptions:
         str, "With npn: where the network runs: auto, cpu, cuda, ...", Spelt(metavar="NAME")
     ] = "auto"
     threads: Annotated[int, "With npn: threads of the network.", Spelt(metavar="N")] = 1
+    only_pattern: Annotated[
+        bool,
+        "Leave transparent what cannot come from the pattern: where it shows nothing alike, and where its "
+        "objects differ so much from one another that any fill is a guess.",
+        Spelt("--only-pattern"),
+    ] = False
     focal_mm: PhotoFocal = None
 
     def __post_init__(self) -> None:

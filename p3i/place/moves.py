@@ -39,7 +39,7 @@ def moves(placed: Placed, target: int) -> Array:
 
     A map of nan stands where none does: between rings that differ too much in radius.
     """
-    turns, sizes = _turns_rad(placed), _sizes(placed)
+    turns, sizes = _turns_rad(placed), ring_radii(placed)
     scale = sizes / sizes[target] if sizes[target] > 0 else np.ones(len(sizes))
     turn = turns - turns[target]
     found = np.tile(np.eye(3), (len(turns), 1, 1))
@@ -75,6 +75,14 @@ def pitch_px(placed: Placed, target: int) -> float:
     return max(2.0, float(others.min())) if len(others) else 2.0
 
 
+def ring_radii(placed: Placed) -> Array:
+    """The radius of the ring that each object [M] lies on; 1 in a lattice."""
+    draw = nest(placed.pattern.program).draw
+    if not isinstance(draw.x, Polar):
+        return np.ones(len(placed.index))
+    return np.abs(_values(draw.x.radius, placed.index))
+
+
 def _turns_rad(placed: Placed) -> Array:
     """How far each object [M] is turned about its ring's centre; nothing turns in a lattice."""
     draw = nest(placed.pattern.program).draw
@@ -82,14 +90,6 @@ def _turns_rad(placed: Placed) -> Array:
         return np.zeros(len(placed.index))
     quarter = 0 if draw.x.function == "Cos" else -np.pi / 2
     return np.radians(_values(draw.x.angle, placed.index)) + quarter
-
-
-def _sizes(placed: Placed) -> Array:
-    """The radius of the ring that each object [M] lies on; 1 in a lattice."""
-    draw = nest(placed.pattern.program).draw
-    if not isinstance(draw.x, Polar):
-        return np.ones(len(placed.index))
-    return np.abs(_values(draw.x.radius, placed.index))
 
 
 def _values(form: Affine, index: NDArray[np.int64]) -> Array:

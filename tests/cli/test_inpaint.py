@@ -42,16 +42,51 @@ def test_the_facts_go_to_a_file_and_the_picture_elsewhere(folder: Path) -> None:
     assert (folder / "out.png").exists()
 
 
-def test_several_objects_are_removed_at_once(folder: Path) -> None:
-    words = ["--remove", "0,0", "--remove", "D6"]
+def test_several_objects_are_restored_at_once(folder: Path) -> None:
+    words = ["--restore", "0,0", "--restore", "D6"]
     assert run(["inpaint", "photo.png", "grid.p3p", *words, "-o", "out.png", "-q"]) == 0
     before, after = (read_image(folder / name).pixels for name in ("photo.png", "out.png"))
     columns = np.flatnonzero((before != after).any((0, 2)))
     assert np.ptp(columns) > 30  # two cells side by side
 
 
+def test_removing_takes_the_object_away_and_says_that_it_meant_another_thing(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["inpaint", "photo.png", "grid.p3p", "--remove", "0,0"]
+    assert run([*words, "-o", "out.png", "--json", "facts.json"]) == 0
+    assert "--restore" in capsys.readouterr().err
+    facts = json.loads((folder / "facts.json").read_text())
+    assert facts["removed"] == 1 and facts["holes"][0]["ground"] == 1
+    assert any("--restore" in note for note in facts["notes"])
+
+
+def test_what_is_marred_is_written_as_a_mask_that_can_be_filled(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pixels = read_image(folder / "photo.png").pixels.copy()
+    pixels[96:106, 118:131] = (0.4, 0.2, 0.1)
+    write_image(folder / "marred.png", pixels)
+    assert (
+        run(["inpaint", "marred.png", "grid.p3p", "--find", "-o", "found.png", "--json", "a.json", "-v"]) == 0
+    )
+    said = capsys.readouterr().err
+    assert "marred: " in said and "none filled" in said
+    facts = json.loads((folder / "a.json").read_text())
+    assert len(facts["found"]) == 1 and facts["found"][0]["objects"]
+    assert run(["inpaint", "marred.png", "grid.p3p", "--mask", "found.png", "-o", "out.png", "-q"]) == 0
+    after = read_image(folder / "out.png").pixels
+    assert np.abs(after - read_image(folder / "photo.png").pixels).mean() * 255 < 1
+
+
+def test_a_clean_pattern_has_nothing_marred(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["inpaint", "photo.png", "grid.p3p", "--find", "-o", "found.png"]) == 0
+    assert "nothing is marred" in capsys.readouterr().err
+    assert read_image(folder / "found.png").pixels.max() == 0
+
+
 def test_a_jpeg_says_that_it_stores_all_anew(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["inpaint", "photo.png", "grid.p3p", "--remove", "0,0", "-o", "out.jpg"]) == 0
+    assert run(["inpaint", "photo.png", "grid.p3p", "--restore", "0,0", "-o", "out.jpg"]) == 0
     assert "JPG stores every pixel anew" in capsys.readouterr().err
 
 
@@ -59,11 +94,15 @@ def test_a_jpeg_says_that_it_stores_all_anew(folder: Path, capsys: pytest.Captur
     ("words", "code", "said"),
     [
         (["--mask", "no.png"], 3, "there is no file no.png"),
-        (["--remove", "Z99"], 2, "there is no object Z99"),
+        (["--restore", "Z99"], 2, "there is no object Z99"),
         ([], 2, "nothing is to be filled"),
-        (["--remove", "0,0", "--time", "5"], 2, "--time belongs to the method npn"),
-        (["--remove", "0,0", "--steps", "0"], 2, "at least one step"),
+        (["--restore", "0,0", "--time", "5"], 2, "--time belongs to the method npn"),
+        (["--restore", "0,0", "--steps", "0"], 2, "at least one step"),
         (["--mask", "photo.png"], 3, "colours"),
+        (["--find", "--mask", "mask.png"], 2, "leave out --mask"),
+        (["--find", "--remove", "0,0"], 2, "leave out --remove"),
+        (["--find", "--only-pattern"], 2, "leave out --only-pattern"),
+        (["--remove", "Z99"], 2, "there is no object Z99"),
     ],
 )
 def test_what_cannot_be_filled_is_refused_by_name(
@@ -76,6 +115,6 @@ def test_what_cannot_be_filled_is_refused_by_name(
 
 def test_a_file_that_exists_is_not_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "out.png").write_bytes(b"mine")
-    assert run(["inpaint", "photo.png", "grid.p3p", "--remove", "0,0", "-o", "out.png"]) == 3
+    assert run(["inpaint", "photo.png", "grid.p3p", "--restore", "0,0", "-o", "out.png"]) == 3
     assert "--force" in capsys.readouterr().err
     assert (folder / "out.png").read_bytes() == b"mine"

@@ -19,7 +19,7 @@ from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
 from p3i.paint.fill.cleared import cleared, covered, local_points, object_masks, windows
-from p3i.paint.fill.cutout import Cutout, Levels, cutout
+from p3i.paint.fill.cutout import Cutout, Levels, cutout, doubts
 from p3i.place.flat import flat_of
 from p3i.place.moves import frames, pitch_px
 from p3i.place.outlines import chart_of, pitch
@@ -39,10 +39,6 @@ _SAME = 0.05
 # An object is worth copying where it is at most this many times farther from the median than a typical one.
 _GOOD = 1.5
 _GAINS = (0.6, 1.6)
-# Where edits of photos looked good, the ground was more even than this, and objects more alike; where objects
-# leave less room than this up to their cell's border, the ground must be more even still.
-_MOST_UNEVEN, _MOST_UNLIKE = 0.35, 0.6
-_LEAST_ROOM, _MOST_UNEVEN_THERE = 0.06, 0.17
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,14 +123,10 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
     if not len(gone) and not len(fresh):
         return Edited(photo, photo.pixels, touched, *counts, tuple(notes))
     cut = cutout(laid, photo)
-    if not cut.clear:
-        notes.append(
-            "no object stands out from the ground of its cell: the middle of the cell is taken for it"
-        )
-    notes += _doubts(cut)
+    notes += doubts(cut)
     own = _mask(_only(laid, old_place), cut)
     removed = covered(_only(laid, gone), cut) & (own < 0.02) & photo.valid
-    ground = cleared(photo.pixels, photo.valid, laid, covered(laid, cut))
+    ground = cleared(photo.pixels, photo.valid, laid, cut)
     pixels = np.where(removed[:, :, None], ground, photo.pixels)
     scale = options.scale
     if scale is None:
@@ -147,20 +139,6 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
     touched = (removed | painted) & photo.valid
     pixels = np.where(touched[:, :, None], pixels, photo.pixels).astype(np.float32)
     return Edited(photo, pixels, touched, *counts, tuple(notes))
-
-
-def _doubts(cut: Cutout) -> list[str]:
-    """A sentence where what was cut out, or the ground that replaces it, is not to be relied on."""
-    if not cut.clear:
-        return []  # said already
-    why: list[str] = []
-    if cut.uneven > _MOST_UNEVEN:
-        why.append("there is no even ground between the objects")
-    elif cut.room < _LEAST_ROOM and cut.uneven > _MOST_UNEVEN_THERE:
-        why.append("the objects reach to their cells' borders")
-    if cut.unlike > _MOST_UNLIKE:
-        why.append("the objects differ much from one another")
-    return [f"look at the result: {', and '.join(why)}, so pieces of others may show"] if why else []
 
 
 def _kept(laid: Placed, wanted: Placed) -> tuple[Index, Index]:
@@ -187,7 +165,7 @@ def _only(laid: Placed, numbers: Index) -> Placed:
 def _mask(laid: Placed, cut: Cutout) -> Floats:
     """How much of each pixel the objects cover: [H, W]."""
     found = np.zeros((laid.size.height, laid.size.width), np.float32)
-    for window, alpha in object_masks(laid, cut):
+    for window, alpha in object_masks(laid, cut.alpha, cut.step):
         found[window] = np.maximum(found[window], alpha)
     return found
 
@@ -213,7 +191,7 @@ def _paint(
     old_frames, new_frames = frames(laid), frames(wanted)
     levels = Levels.of(photo.pixels)
     touched = np.zeros(photo.valid.shape, bool)
-    for number, window in enumerate(windows(wanted, cut, scale=scale)):
+    for number, window in enumerate(windows(wanted, cut.alpha, cut.step, scale=scale)):
         if window is None or not new_front[number]:
             continue
         source = int(good[np.argmin(np.hypot(*(old_px[good] - new_px[number]).T))])

@@ -1,52 +1,70 @@
-"""A photo without its objects: the ground that lies between them, continued under them.
+"""A photo without some of its objects: the ground that lies between them, continued under them.
 
-The colour under an object is the smooth continuation of the ground around it; its texture is that of the
-ground at half a step's distance, where the cell has none of an object.
+What the median cell has beside its object, carried on under it (cutout.py), is what is expected there. What
+the photo differs from that by around an object, in light and colour, is carried in from the object's rim. Its
+texture is that of ground elsewhere, over and above what is expected there, so that lines which run between
+objects are not copied to where none does; where no move lays an object wholly onto ground, it is grain
+(grain.py), since pieces of several would show their seams.
 
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool or float32 [H, W].
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.cutout import Cutout
-from p3i.place.moves import frames
+from p3i.paint.fill.grain import Grain
+from p3i.paint.fill.light import carried, rim_of
+from p3i.place.moves import frames, pitch_px
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
-from p3i.vision.fill import filled
+from p3i.vision.fill import eroded, filled
 from p3i.vision.sheet import project
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-# What is cleared reaches this far beyond an object, in its radii: edges are blurred, and objects slip.
-_WIDER = 0.12
-# Of the ground between an object and its cell's border, they take this share at most.
-_OF_ROOM = 0.3
+# An object covers what its cutout covers by at least this.
 _LEAST_ALPHA = 0.1
-# The ground's light is smooth over this share of a cell; it needs so many rounds to come under an object.
+# Light is smooth over this share of a cell; what is expected is brought into that by a gain in these bounds.
 _BLUR = 0.12
-_DIFFUSIONS = 12
-# Texture is faint; what differs more from the light of the ground is another thing that lies there.
-_MOST_TEXTURE = 0.08
+_GAINS = (0.4, 2.5)
+# Texture that differs from the ground's by more than so many of its deviations is another thing.
+_MOST_DEVIATIONS = 4.0
+# A rim of so many pixels tells what an object's ground differs by from what is expected.
+_RIM_PX = 3.0
+# Places that texture is brought from: steps in these parts of the way from object to object, up to this far.
+_PARTS, _FARTHEST = 8, 1.0
+_MOST_MOVES = 16
+_WHOLLY = 0.98
+# Texture is taken so far from objects at least, in distances: edges are blurred, and objects slip.
+_AWAY = 0.02
 # Light that is smooth over at least twice as many pixels is computed on a reduced picture.
 _FINEST_SIGMA = 4.0
 # Rows of the photo whose texture is looked up at once.
 _STRIP = 512
+# A cell's ground reaches this far beyond its border, in distances, where no other cell has it.
+_BEYOND = 0.05
+# The ground's light is told where this share of what is around is ground.
+_LEAST_SPREAD = 0.05
 
 
-def windows(placed: Placed, cut: Cutout, *, scale: float = 1.0) -> list[tuple[slice, slice] | None]:
-    """Where each object may reach on the photo, rows and columns; None for those out of sight."""
-    rows, columns = np.nonzero(cut.alpha > 0)
-    half = (cut.alpha.shape[0] - 1) / 2
-    # The grid's places that hold something of the object, and one more all around.
+def windows(
+    placed: Placed, layer: Floats, step: float, *, scale: float = 1.0
+) -> list[tuple[slice, slice] | None]:
+    """Where a cell's `layer` [side, side(, C)] of each object may reach on the photo, rows and columns.
+
+    Where its last channel is above 0; `step` is the grid's. None for objects out of sight.
+    """
+    rows, columns = np.nonzero((layer if layer.ndim == 2 else layer[:, :, -1]) > 0)
+    half = (layer.shape[0] - 1) / 2
+    # The grid's places that hold something, and one more all around.
     low, high = (
-        (np.array([end(columns), end(rows)]) - half + one) * cut.step * scale
+        (np.array([end(columns), end(rows)]) - half + one) * step * scale
         for end, one in ((np.min, -1), (np.max, 1))
     )
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1]), (0, 0)])
@@ -69,15 +87,15 @@ def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> A
     return (points - frame[:2, 2]) @ frame[:2, :2]
 
 
-def object_masks(
-    placed: Placed, cut: Cutout, *, wider: float = 1.0
-) -> Iterator[tuple[tuple[slice, slice], Floats]]:
-    """For each object in sight its window and how much of each pixel it covers [h, w]; `wider` scales it."""
+def object_masks(placed: Placed, layer: Floats, step: float) -> Iterator[tuple[tuple[slice, slice], Floats]]:
+    """For each object in sight its window, and a `layer` of its cell's grid as it is seen: [h, w(, C)].
+
+    `step` is the grid's, in program units.
+    """
     plane_from_image = np.linalg.inv(placed.image_from_plane)
-    half = (cut.alpha.shape[0] - 1) / 2
-    grid_from_local = np.diag([1 / (cut.step * wider), 1 / (cut.step * wider), 1.0])
-    grid_from_local[:2, 2] = half
-    for frame, window in zip(frames(placed), windows(placed, cut, scale=wider), strict=True):
+    grid_from_local = np.diag([1 / step, 1 / step, 1.0])
+    grid_from_local[:2, 2] = (layer.shape[0] - 1) / 2
+    for frame, window in zip(frames(placed), windows(placed, layer, step), strict=True):
         if window is None:
             continue
         rows, columns = window
@@ -87,65 +105,119 @@ def object_masks(
         size = (columns.stop - columns.start, rows.stop - rows.start)
         # Beyond the grid nothing lies: the border is 0.
         how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        yield window, np.asarray(cv2.warpPerspective(cut.alpha, matrix, size, flags=how), np.float32)
+        yield window, np.asarray(cv2.warpPerspective(layer, matrix, size, flags=how), np.float32)
 
 
 def covered(placed: Placed, cut: Cutout) -> Mask:
-    """The pixels that objects cover, with a little around them: [H, W]."""
-    wider = 1 + min(_WIDER, _OF_ROOM * cut.room / max(0.5 - cut.room, 0.05))
+    """The pixels that objects cover, with all that goes with them: [H, W]."""
     mask = np.zeros((placed.size.height, placed.size.width), bool)
-    for window, alpha in object_masks(placed, cut, wider=wider):
-        mask[window] |= alpha > _LEAST_ALPHA
+    for window, gone in object_masks(placed, cut.gone, cut.step):
+        mask[window] |= gone > _LEAST_ALPHA
     return mask
 
 
-def cleared(pixels: Floats, valid: Mask, placed: Placed, objects: Mask) -> Floats:
-    """The photo with the ground continued under `objects` [H, W]: float32 [H, W, 3]."""
-    ground = valid & ~objects
-    if not ground.any():
+def cleared(
+    pixels: Floats, valid: Mask, placed: Placed, cut: Cutout, *, objects: Mask | None = None
+) -> Floats:
+    """The photo with the ground of the pattern's cells continued under `objects` [H, W]: float32 [H, W, 3].
+
+    By default under all. The ground is what none of the pattern's objects covers.
+    """
+    every = covered(placed, cut)
+    wanted = every if objects is None else objects
+    expected, within = _expected(placed, cut)
+    ground = valid & ~every & within
+    if not ground.any() or not wanted.any():
         return pixels
-    even, under = _light(pixels, ground, sigma=max(1.0, _BLUR * _pitch_px(placed)))
+    sigma = max(1.0, _BLUR * _pitch_px(placed))
+    expected *= _gain(pixels, expected, ground, sigma=4 * sigma)
+    off = np.subtract(pixels, expected)
+    detail = off - _even(off, ground, sigma=sigma)
+    typical = _typical(detail, ground)
     result = pixels.copy()
-    detail = np.subtract(pixels, even, out=even)
-    detail[~ground] = 0
-    inner = cv2.erode(ground.astype(np.uint8), np.ones((3, 3), np.uint8))
-    moves = [_move(placed, each) for each in _half_steps(placed)]
+    for rows, columns, inside, spacing in _holes(wanted, placed):
+        # What its own rim shows, but for other things there, if there is more than them.
+        for beside in (typical, ground, valid & ~every):
+            rim = rim_of(inside, beside[rows, columns], reach_px=_RIM_PX)
+            if rim.any():
+                break
+        lacking = carried(off[rows, columns] * rim[:, :, None], rim.astype(np.float32), spacing_px=spacing)
+        np.copyto(result[rows, columns], expected[rows, columns] + lacking, where=(inside > 0)[:, :, None])
+    inner = eroded(typical, max(1, round(_AWAY * _pitch_px(placed))))
+    inner = inner if inner.any() else typical
+    moves = [_move(placed, each) for each in _steps_to_ground(placed, cut)]
+    noise = Grain.of(detail, inner, most_px=sigma)
     # In strips: what is looked up for each pixel takes more memory than the photo.
-    for start in range(0, len(objects), _STRIP):
+    for start in range(0, len(wanted), _STRIP):
         rows = slice(start, start + _STRIP)
-        wanted = objects[rows]
-        if not wanted.any():
-            continue
-        texture = _texture(detail, inner, moves, wanted, top=start)
-        grown = under[rows][wanted] + np.clip(texture[wanted], -_MOST_TEXTURE, _MOST_TEXTURE)
-        result[rows][wanted] = np.clip(grown, 0, 1)
-    return result
+        if wanted[rows].any():
+            texture, bare = _texture(detail, inner, moves, wanted[rows], top=start)
+            texture[bare] = noise.drawn(bare, seed=start)[bare]
+            result[rows] += texture
+    return np.clip(result, 0, 1, out=result)
 
 
-def _light(pixels: Floats, ground: Mask, *, sigma: float) -> tuple[Floats, Floats]:
-    """The ground's light, smooth over `sigma` pixels, and the same carried on under what is no ground.
+def _expected(placed: Placed, cut: Cutout) -> tuple[Floats, Mask]:
+    """The median cell's ground at each pixel of the pattern's cells [H, W, 3], and which pixels those are."""
+    height, width = placed.size.height, placed.size.width
+    shown, deepest = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
+    # How far inside its cell a place lies, from 0 a little beyond its border: the deepest cell has the pixel.
+    inside = np.clip(cut.own + _BEYOND, 0, None).astype(np.float32)
+    layers = np.concatenate([cut.ground, inside[:, :, None]], 2)
+    for window, layer in object_masks(placed, layers, cut.step):
+        deeper = layer[:, :, 3] > deepest[window]
+        np.copyto(shown[window], layer[:, :, :3], where=deeper[:, :, None])
+        np.copyto(deepest[window], layer[:, :, 3], where=deeper)
+    return shown, deepest > 0
 
-    Both [H, W, 3]. What is that smooth is known from a reduced picture as well.
+
+def _gain(pixels: Floats, expected: Floats, ground: Mask, *, sigma: float) -> Floats:
+    """How much lighter the photo's ground is than what is expected, smooth over `sigma` pixels: [H, W, 3]."""
+    here, there = (_even(each, ground, sigma=sigma) for each in (pixels, expected))
+    return np.clip((here + 0.02) / (there + 0.02), *_GAINS).astype(np.float32)
+
+
+def _even(values: Floats, ground: Mask, *, sigma: float) -> Floats:
+    """The ground's values [H, W, 3] smooth over `sigma` pixels, and those of the nearest where it is none.
+
+    What is that smooth is known from a reduced picture as well.
     """
     height, width = ground.shape
     reduce = 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
-    known, weight = np.where(ground[:, :, None], pixels, np.float32(0)), ground.astype(np.float32)
-    size = (max(1, -(-width // reduce)), max(1, -(-height // reduce)))
+    known, weight = np.where(ground[:, :, None], values, np.float32(0)), ground.astype(np.float32)
     if reduce > 1:
+        size = (max(1, -(-width // reduce)), max(1, -(-height // reduce)))
         known, weight = (cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in (known, weight))
         sigma = sigma * size[0] / width
     spread = cv2.GaussianBlur(weight, (0, 0), sigma)
     even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(spread, 1e-4)[:, :, None]
-    # Carried under the objects as a membrane is: by diffusion from all sides.
-    fixed = weight >= 0.5
-    under = filled(np.where(fixed[:, :, None], even, np.float32(0)), fixed)
-    for _ in range(_DIFFUSIONS):
-        under = np.where(fixed[:, :, None], even, cv2.GaussianBlur(under, (0, 0), sigma))
+    even = filled(np.asarray(even, np.float32), spread > _LEAST_SPREAD)
     if reduce > 1:
-        even, under = (
-            cv2.resize(each, (width, height), interpolation=cv2.INTER_LINEAR) for each in (even, under)
-        )
-    return np.asarray(even, np.float32), np.asarray(under, np.float32)
+        even = cv2.resize(even, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(even, np.float32)
+
+
+def _holes(wanted: Mask, placed: Placed) -> Iterator[tuple[slice, slice, NDArray[np.uint8], float]]:
+    """What hangs together of the mask: window, mask in it, and how far the next object lies, in pixels."""
+    labels, stats, middles = cv2.connectedComponentsWithStats(wanted.astype(np.uint8), connectivity=4)[1:]
+    pixels, front = placed.centers_px()
+    front_px = np.where(front[:, None], pixels, np.inf)
+    for label in range(1, len(stats)):
+        x, y, width, height = stats[label, :4].tolist()
+        target = int(np.argmin(np.hypot(*(front_px - middles[label]).T)))
+        margin = int(np.ceil(_RIM_PX)) + 1
+        rows = slice(max(0, y - margin), y + height + margin)
+        columns = slice(max(0, x - margin), x + width + margin)
+        yield rows, columns, (labels[rows, columns] == label).astype(np.uint8), pitch_px(placed, target)
+
+
+def _typical(detail: Floats, ground: Mask) -> Mask:
+    """Where `detail` [H, W, 3] is texture of the ground, not another thing that lies on it: [H, W]."""
+    size = np.abs(detail).max(2)
+    # The median of the absolute deviation, as one of a normal distribution.
+    limit = _MOST_DEVIATIONS * 1.4826 * float(np.median(size[ground])) + 1 / 255
+    other = cv2.dilate(((size > limit) & ground).astype(np.uint8), np.ones((3, 3), np.uint8))
+    return ground & (other == 0)
 
 
 def _move(placed: Placed, step: Array) -> Array:
@@ -155,11 +227,14 @@ def _move(placed: Placed, step: Array) -> Array:
     return placed.image_from_plane @ moved @ np.linalg.inv(placed.image_from_plane)
 
 
-def _texture(detail: Floats, inner: NDArray[Any], moves: list[Array], wanted: Mask, *, top: int) -> Floats:
-    """What the ground half a step away has beside its smooth part: [h, W, 3], 0 where nothing is `wanted`.
+def _texture(
+    detail: Floats, inner: Mask, moves: list[Array], wanted: Mask, *, top: int
+) -> tuple[Floats, Mask]:
+    """What the ground that the moves lead to has beside its smooth part: [h, W, 3]; where none does [h, W].
 
-    `wanted` [h, W] is a strip of the photo from row `top` on; `detail` [H, W, 3] is read where `inner` is 1.
+    `wanted` [h, W] is a strip of the photo from row `top` on; `detail` [H, W, 3] is read where `inner`.
     """
+    shown_there = inner.astype(np.uint8)
     found = np.zeros((*wanted.shape, 3), np.float32)
     left = wanted.copy()
     photo_from_strip = np.array([[1, 0, 0], [0, 1, top], [0, 0, 1.0]])
@@ -176,22 +251,34 @@ def _texture(detail: Floats, inner: NDArray[Any], moves: list[Array], wanted: Ma
         depth = (
             matrix[2, 0] * np.arange(size[0]) + (matrix[2, 1] * np.arange(size[1]) + matrix[2, 2])[:, None]
         )
-        shown = (cv2.warpPerspective(inner, matrix, size, flags=how) > 0) & (depth > 1e-9) & left[part]
+        shown = (cv2.warpPerspective(shown_there, matrix, size, flags=how) > 0) & (depth > 1e-9) & left[part]
         if shown.any():
             found[part][shown] = cv2.warpPerspective(detail, matrix, size, flags=how)[shown]
             left[part] &= ~shown
-    return found
+    return found, left
 
 
-def _half_steps(placed: Placed) -> Array:
-    """Moves on the plane from objects to the ground between them, the middle of cells before their sides."""
-    middle = placed.index[np.argmin(np.hypot(*(placed.points - np.median(placed.points, 0)).T))].astype(float)
-    halves = np.array(
-        [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)] + [(0.5, 0), (-0.5, 0), (0, 0.5), (0, -0.5)]
-    )
-    moves = placed.at(middle + halves) - placed.at(middle[None])
-    moves = np.concatenate([moves, 0.6 * moves, 0.8 * moves])
-    return moves[np.hypot(*moves.T) > 1e-6]
+def _steps_to_ground(placed: Placed, cut: Cutout) -> Array:
+    """Moves on the plane that bring an object wholly onto ground, the shortest first: [K, 2]."""
+    chosen = int(np.argmin(np.hypot(*(placed.points - np.median(placed.points, 0)).T)))
+    frame, middle = frames(placed)[chosen], placed.index[chosen].astype(float)
+    half = (cut.gone.shape[0] - 1) / 2
+    rows, columns = np.nonzero(cut.gone > _LEAST_ALPHA)
+    places = (np.stack([columns, rows], 1)[:: max(1, len(rows) // 300)] - half) * cut.step
+    places = places @ frame[:2, :2].T + frame[:2, 2]
+    line = np.linspace(-_FARTHEST, _FARTHEST, round(2 * _FARTHEST * _PARTS) + 1)
+    parts = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2)
+    steps = placed.at(middle + parts) - placed.at(middle[None])
+    others = placed.at(middle + np.stack(np.meshgrid(*[np.arange(-3, 4)] * 2), -1).reshape(-1, 2))
+    free = np.array([1 - _on_objects(places + step, others, frame, cut).mean() for step in steps])
+    order = np.argsort(np.hypot(*steps.T), kind="stable")
+    return steps[order][free[order] > _WHOLLY][:_MOST_MOVES]
+
+
+def _on_objects(points: Array, others: Array, frame: Array, cut: Cutout) -> Mask:
+    """Which points [K, 2] of the plane lie on an object at `others` [M, 2], turned as `frame` is."""
+    nearest = others[np.argmin(np.hypot(*(points[:, None] - others).transpose(2, 0, 1)), axis=1)]
+    return cut.at((points - nearest) @ frame[:2, :2], cut.gone) > _LEAST_ALPHA
 
 
 def _pitch_px(placed: Placed) -> float:

@@ -2,7 +2,9 @@
 
 The cells of all objects are laid onto one another by the program's own frames (place/moves.py), brought to
 one light, and their median taken. The cell's border, as far from objects as places are, shows the ground;
-continued smoothly into the cell it is what would lie under the object, and what differs is the object.
+continued into the cell, smoothly or straight along the pattern's directions (through.py), it is what would
+lie under the object, and what none of these continuations tells is the object. What is fainter and hangs on
+the object, its shadow and rim, goes where it goes.
 
 Convention: a cell is sampled on a square grid about its object, `side` x `side` places, `step` program units
 apart; RGB in 0..1.
@@ -14,6 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.paint.fill.grid import Straight
+from p3i.paint.fill.through import continued, through
 from p3i.place.moves import frames
 from p3i.place.outlines import chart_of, pitch
 from p3i.place.placed import Placed
@@ -39,11 +43,29 @@ _LEAST_CONTRAST = 4.0
 _DEVIATIONS = 2.0
 # An object is at least this share of its cell, and at most that.
 _LEAST_SHARE, _MOST_SHARE = 0.01, 0.92
+# Ground that runs on straight must leave this share at most of what a smooth one leaves unexplained, to be
+# believed: along one direction, along several at once.
+_STRAIGHT, _CROSSED = 0.8, 0.5
+_FAINT = 0.5  # in Lab: less than this is explained by any
+_TOLD = 0.6  # of a cell, at least, is ground
+# What hangs on an object and differs from its ground by so much goes with it: the least that an eye sees, in
+# Lab (Mahy, van Eycken and Oosterlinck, Color Research and Application 1994), and so many deviations.
+_JUST_SEEN = 2.3
+_SEEN_DEVIATIONS = 1.0
+_SLIPPED = 2.0
+# Shadow and rim lie within this of it, in distances.
+_HANGS_ON = 0.15
+# What goes reaches this much further, in distances: edges are blurred, and objects slip.
+_SLIP = 0.03
 # Parts of fewer places are noise; what stays within the cell is its object, if it is this share of all.
 _LEAST_PART = 6
 _LOOSE_SHARE = 0.15
 # Where no object stands out, the middle of the cell is taken for it, this far, in distances.
 _ASSUMED = 0.36
+# Where edits of photos looked good, the ground was more even than this, and objects more alike; where objects
+# leave less room than this up to their cell's border, the ground must be more even still.
+_MOST_UNEVEN, _MOST_UNLIKE = 0.35, 0.6
+_LEAST_ROOM, _MOST_UNEVEN_THERE = 0.06, 0.17
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,10 +94,13 @@ class Levels:
 class Cutout:
     """The object of a program's cells: `alpha` float32 [side, side], 1 on it, soft at its edge.
 
+    `gone` [side, side] is 1 on all that goes with it, shadow and rim too, `ground` [side, side, 3] the median
+    cell without that, `own` [side, side] how far inside its own cell a place lies, in distances.
+
     `room` is how much ground lies between it and the cell's border, where they are closest, in distances.
-    `uneven` is how much the ground at that border differs from place to place, as a share of the difference
-    between object and ground; `unlike` how far a typical object is from the median cell, as a share of the
-    contrast within that.
+    `uneven` is how much the ground at that border differs from place to place, but along the direction that
+    it runs in, as a share of the difference between object and ground; `unlike` how far a typical object is
+    from the median cell, as a share of the contrast within that.
 
     `step` is the grid's distance in program units; `mean` [side, side, 3] the median cell; `misfit` [M] how
     far each object of the program is from it, inf for those not seen wholly. `clear` says whether the object
@@ -83,7 +108,10 @@ class Cutout:
     """
 
     alpha: Floats
+    gone: Floats
     mean: Floats
+    ground: Floats
+    own: Array
     step: float
     misfit: Array
     clear: bool
@@ -109,14 +137,57 @@ class Cutout:
         return taken(self.alpha if layer is None else layer, at) * inside
 
 
-def cutout(placed: Placed, photo: Image) -> Cutout:
-    """The object that the cells of `placed` on its straight photo have in common."""
-    chart = chart_of(placed.pattern)
-    spacing = pitch(chart)
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampled:
+    """The cells of all objects as the photo has them: `cells` [M, side, side, 3], `seen` [M, side, side].
+
+    `own` [side, side] is how far inside its own cell a place lies, in distances, `step` that of places in
+    program units, `places` how many there are from an object to the next.
+    """
+
+    cells: Floats
+    seen: Mask
+    own: Array
+    step: float
+    places: float
+
+
+def sampled_cells(placed: Placed, photo: Image) -> Sampled:
+    """The cells of all objects of a straight photo."""
+    spacing = pitch(chart_of(placed.pattern))
+    local, step = _grid(spacing)
+    cells, seen = _cells(placed, photo, local)
+    shape = (len(cells), _SIDE, _SIDE)
+    own = _own_ground(placed, local, spacing)
+    return Sampled(cells.reshape(*shape, 3), seen.reshape(shape), own, step, spacing / step)
+
+
+def _grid(spacing: float) -> tuple[Array, float]:
+    """The grid's places [K, 2] about an object, in program units, and how far they are apart."""
     half = (_SIDE - 1) // 2
     step = _REACH * spacing / half
     line = (np.arange(_SIDE) - half) * step
-    local: Array = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2).astype(np.float64)
+    return np.stack(np.meshgrid(line, line), -1).reshape(-1, 2).astype(np.float64), step
+
+
+def doubts(cut: Cutout) -> list[str]:
+    """A sentence where what was cut out, or the ground that replaces it, is not to be relied on."""
+    if not cut.clear:
+        return ["no object stands out from the ground of its cell: the middle of the cell is taken for it"]
+    why: list[str] = []
+    if cut.uneven > _MOST_UNEVEN:
+        why.append("there is no even ground between the objects")
+    elif cut.room < _LEAST_ROOM and cut.uneven > _MOST_UNEVEN_THERE:
+        why.append("the objects reach to their cells' borders")
+    if cut.unlike > _MOST_UNLIKE:
+        why.append("the objects differ much from one another")
+    return [f"look at the result: {', and '.join(why)}, so pieces of others may show"] if why else []
+
+
+def cutout(placed: Placed, photo: Image) -> Cutout:
+    """The object that the cells of `placed` on its straight photo have in common."""
+    spacing = pitch(chart_of(placed.pattern))
+    local, step = _grid(spacing)
     own = _own_ground(placed, local, spacing)
     cells, seen = _cells(placed, photo, local)
     whole = seen[:, own.ravel() > 0].mean(1) > 0.98
@@ -130,23 +201,52 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     mean = np.ascontiguousarray(middle.transpose(1, 2, 0))
     apart = np.abs(cells - mean.reshape(-1, 3)).mean(2) * seen
     misfit = np.where(whole, apart[:, own.ravel() > 0].mean(1), np.inf)
-    alpha = _segmented(mean, spread.mean(0), own, spacing / step)
-    clear = alpha is not None
-    if alpha is None:
+    straight = Straight.of(placed, side=_SIDE, step=step)
+    flat, flat_own = straight.laid(mean), straight.laid(own.astype(np.float32))
+    along, found = _segmented(
+        flat, straight.laid(spread.transpose(1, 2, 0)).mean(2), flat_own, straight.directions
+    )
+    clear = found is not None
+    if found is None:
         reach = np.hypot(local[:, 0], local[:, 1]).reshape(_SIDE, _SIDE)
-        alpha = np.clip((_ASSUMED * spacing - reach) / (0.05 * spacing) + 0.5, 0, 1).astype(np.float32)
+        disc = np.clip((_ASSUMED * spacing - reach) / (0.05 * spacing) + 0.5, 0, 1).astype(np.float32)
+        found = straight.laid(disc), straight.laid(disc) > 0
+    thing, with_it = found
+    slip = _disc(_SLIP * spacing / step)
+    with_it = (cv2.dilate(with_it.astype(np.uint8), slip) > 0) & (flat_own > 0)
+    known = (flat_own > -_BORDER) & ~with_it
+    # Lines go on, and where all of the ground runs along one direction, it does so under the object.
+    flat_ground = through(flat, known, with_it, straight.directions)
+    if along is not None:
+        flat_ground = np.where(with_it[:, :, None], continued(flat, known, along[None])[1], flat_ground)
+    ground = straight.bent(flat_ground)
+    # A soft edge, two places wide, within the cell.
+    within = np.clip(own * spacing / step + 1, 0, 1)
+    alpha = (straight.bent(thing) * within).astype(np.float32)
+    gone = (straight.bent(with_it.astype(np.float32)) * within).astype(np.float32)
     room = max(0.0, float(own[alpha > 0.5].min(initial=0.5)))
-    uneven = _unevenness(mean, alpha > 0.5, own)
+    uneven = _unevenness(flat, thing, flat_own, along)
     contrast = float(mean[own > 0].std(axis=0).mean())
     unlike = float(np.median(misfit[whole])) / max(contrast, 1e-6) if whole.sum() > 1 else 0.0
-    return Cutout(alpha, mean, step, misfit, clear, room, uneven, unlike)
+    return Cutout(alpha, gone, mean, ground, own, step, misfit, clear, room, uneven, unlike)
 
 
-def _unevenness(mean: Floats, thing: Mask, own: Array) -> float:
-    """The spread of the ground's colour at the cell's border over its distance from the object's (Lab)."""
+def _unevenness(mean: Floats, thing: Floats, own: Floats, along: Array | None) -> float:
+    """The spread of the ground's colour at the cell's border over its distance from the object's (Lab).
+
+    What runs `along` a direction [2] through all of the cell is even.
+    """
     colours = lab_of(mean)
-    ground = colours[(own > -_BORDER) & (own < _BORDER)]
-    apart = float(np.linalg.norm(colours[thing].mean(0) - ground.mean(0))) if thing.any() else 0.0
+    rows, columns = np.nonzero((own > -_BORDER) & (own < _BORDER))
+    ground, inside = colours[rows, columns], thing > 0.5
+    apart = float(np.linalg.norm(colours[inside].mean(0) - ground.mean(0))) if inside.any() else 0.0
+    if along is not None:
+        step = along / np.hypot(*along)
+        strip = np.rint(columns * step[1] - rows * step[0]).astype(int)
+        strip -= strip.min()
+        count = np.maximum(np.bincount(strip), 1)
+        means = np.stack([np.bincount(strip, channel) / count for channel in ground.T], 1)
+        ground = ground - means[strip]
     return float(np.linalg.norm(ground.std(0))) / max(apart, 1e-6)
 
 
@@ -200,28 +300,59 @@ def _evened(cells: Floats, seen: Mask, chosen: NDArray[np.int64]) -> Floats:
     return cells * np.clip(gain, 0.4, 2.5)[:, None].astype(np.float32)
 
 
-def _segmented(mean: Floats, spread: Floats, own: Array, spacing: float) -> Floats | None:
-    """How much each place of the median cell is object; None where nothing stands out from the ground."""
+def _segmented(
+    mean: Floats, spread: Floats, own: Floats, directions: Array
+) -> tuple[Array | None, tuple[Floats, Mask] | None]:
+    """How much each place of the median cell is object, and what goes with it, both [side, side].
+
+    None where nothing stands out. First the direction [2] along which the ground runs, if it does.
+    """
     ground = (own > -_BORDER) & (own < _BORDER)
-    colours = lab_of(mean)
-    under = filled(colours, ground)
-    under = cv2.GaussianBlur(under, (0, 0), 0.06 * spacing)
-    apart = np.sqrt(((colours - under) ** 2).sum(2))
-    # Ground that differs much within the border, or from cell to cell, is none.
-    noise = max(float(np.median(apart[ground])), 100 * float(np.median(spread[ground])))
     inner = own > 0
+    colours = lab_of(mean)
+    ways = [np.sqrt(((colours - under) ** 2).sum(2)) for under in continued(colours, ground, directions)]
+    ways.append(np.minimum.reduce(ways))
+    # By the places that are told best: the object tells nothing of its ground.
+    most = int(_TOLD * inner.sum())
+    told = [np.sort(way[inner])[:most].mean() + _FAINT for way in ways]
+    shares = (1.0, *[_STRAIGHT] * len(directions), _CROSSED)
+    costs = [float(one) / share for one, share in zip(told, shares, strict=True)]
+    best = int(np.argmin(costs))
+    apart, along = ways[best], directions[best - 1] if 0 < best <= len(directions) else None
+    under = _smoothed_over(colours, ground)
+    # Ground that differs much within the border, or from cell to cell, is none.
+    noise = max(float(np.median(under[ground])), 100 * float(np.median(spread[ground])))
     level = _divide(apart[inner])
     if level < max(_LEAST_CONTRAST, _DEVIATIONS * noise):
-        return None
+        return along, None
     core = ((apart > level) & inner).astype(np.uint8)
     core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
-    whole = _hull(_loose(core, own * spacing)) & inner
-    share = float((whole & inner).sum() / inner.sum())
+    places = own.shape[0] / (2 * _REACH)  # of the grid, from one object to the next
+    whole = _hull(_loose(core, own * places)) & inner
+    share = float(whole.sum() / inner.sum())
     if not _LEAST_SHARE <= share <= _MOST_SHARE:
-        return None
-    # A soft edge, two places wide, within the cell.
-    soft = cv2.GaussianBlur(whole.astype(np.float32), (0, 0), 0.8)
-    return (soft * np.clip(own * spacing + 1, 0, 1)).astype(np.float32)
+        return along, None
+    # Where cells differ beside an object its edge slips.
+    differs = np.maximum(apart, _SLIPPED * 100 * spread)
+    seen = (differs > max(_JUST_SEEN, _SEEN_DEVIATIONS * noise)) & inner
+    seen = cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_OPEN, _disc(1)) > 0
+    seen &= cv2.dilate(whole.astype(np.uint8), _disc(_HANGS_ON * places)) > 0
+    labels = cv2.connectedComponents((seen | whole).astype(np.uint8), connectivity=4)[1]
+    with_it = np.isin(labels, np.unique(labels[whole])) & (labels > 0)
+    soft = np.asarray(cv2.GaussianBlur(whole.astype(np.float32), (0, 0), 0.8), np.float32)
+    return along, (soft, with_it)
+
+
+def _smoothed_over(colours: Floats, ground: Mask) -> Array:
+    """How far the ground's colours [side, side, 3] lie from their own smooth continuation: [side, side]."""
+    under = cv2.GaussianBlur(filled(colours, ground), (0, 0), 0.06 * colours.shape[0] / (2 * _REACH))
+    return np.sqrt(((colours - under) ** 2).sum(2))
+
+
+def _disc(radius: float) -> NDArray[np.uint8]:
+    """A disc of at least one place around its middle."""
+    size = 2 * max(1, round(radius)) + 1
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
 
 def _loose(core: NDArray, depth: Array) -> Mask:

@@ -5,7 +5,6 @@ the hole stays as it is, to the bit.
 """
 
 import dataclasses
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -15,18 +14,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.inpaint import InpaintOptions
-from p3i.options.points import PointsOptions
+from p3i.paint.fill.cleared import cleared, covered
+from p3i.paint.fill.cutout import cutout, doubts
 from p3i.paint.fill.filled import Filled, share_text
+from p3i.paint.fill.found import beside_hole
+from p3i.paint.fill.holes import CHANGED, HoleFacts, Named, asked_for, facts_of, only
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.continued import continued
-from p3i.place.flat import flat_of
-from p3i.place.objects import objects_of
-from p3i.place.placed import Placed, placed
+from p3i.place.flat import Flat, flat_of
+from p3i.place.moves import pitch_px
+from p3i.place.placed import Placed
 from p3i.records import changed
-from p3i.vision.image import Image, read_mask
+from p3i.vision.image import Image, masked
 from p3i.vision.picture import Picture, opacity, repainted
 
 Floats = NDArray[np.float32]
@@ -37,13 +38,22 @@ Progress = Callable[[str, float], None]
 _LENS_MARGIN_PX = 2
 
 
+# The surroundings of a hole that are looked at for what is not of the pattern, in distances between objects.
+_BESIDE = 0.15
+# So many holes are told of in sentences; all are in the record.
+_MOST_TOLD = 5
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Inpainted:
     """A photo with its `hole` [H, W] filled by `method`: `pixels` float32 [H, W, 3].
 
     `unlike` is the share of the hole for which the program knows nothing like it; `fallback` the share that
     something simpler than the method filled, that one included. `added` are the (i, j) with which the pattern
-    goes on through the hole beyond what the program draws. `notes` are sentences for the user.
+    goes on through the hole beyond what the program draws. `removed` objects were taken away: where they lay
+    is part of the hole. `foreign` [H, W] is what of it cannot come from the pattern, and transparent in the
+    picture where `only_pattern`; `holes` has the facts of each hole, the largest first. `notes` are sentences
+    for the user.
     """
 
     photo: Image
@@ -52,13 +62,23 @@ class Inpainted:
     method: str
     unlike: float
     fallback: float
+    removed: int
+    foreign: Mask
+    only_pattern: bool
+    holes: tuple[HoleFacts, ...]
     notes: tuple[str, ...] = ()
     added: tuple[tuple[int, int], ...] = ()
 
     def paint(self) -> Picture:
-        """The picture in the photo's depth; where the hole was transparent it is so no longer."""
+        """The picture in the photo's depth; where the hole was transparent it is so no longer.
+
+        But for what cannot come from the pattern, with `only_pattern`.
+        """
         alpha = opacity(self.photo)
         alpha = None if alpha is None else np.where(self.hole, np.float32(1), alpha)
+        if self.only_pattern and self.foreign.any():
+            alpha = np.ones(self.hole.shape, np.float32) if alpha is None else alpha
+            alpha = np.where(self.foreign, np.float32(0), alpha)
         return repainted(self.photo, self.pixels, alpha=alpha)
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
@@ -71,9 +91,11 @@ class Inpainted:
             "photo": [self.photo.size.width, self.photo.size.height],
             "method": self.method,
             "filled": int(self.hole.sum()),
+            "removed": self.removed,
             "unlike": round(self.unlike, 4),
             "fallback": round(self.fallback, 4),
             "added": [list(index) for index in self.added],
+            "holes": [one.record() for one in self.holes],
             "notes": list(self.notes),
         }
 
@@ -84,104 +106,105 @@ def inpaint(
     options: InpaintOptions | None = None,
     *,
     mask: str | PathLike[str] | Mask | None = None,
-    remove: Sequence[str | tuple[int, int]] = (),
+    restore: Sequence[Named] = (),
+    remove: Sequence[Named] = (),
     progress: Progress | None = None,
     **changes: Any,
 ) -> Inpainted:
-    """The photo with a hole filled: what `mask` marks, and the cells of the objects in `remove`.
+    """The photo with a hole filled: what `mask` marks, and the cells of the objects to `restore`.
 
-    Without either it is what is transparent. `mask` is a picture (white is to be filled) or bool [H, W];
-    `remove` holds names (`"B3"`) or indices ((i, j)) of objects, as `p3i points` lists them. `changes` are
-    fields of InpaintOptions.
+    The objects to `remove` are taken away, and the ground between objects goes on under them (cleared.py).
+    Without any of these the hole is what is transparent. `mask` is a picture (white is to be filled) or bool
+    [H, W]; objects are names (`"B3"`) or indices ((i, j)), as `p3i points` lists them. `changes` are fields
+    of InpaintOptions.
 
-    Raises UsageError where neither marks anything, all is marked, or an object is unknown; FileError for a
-    mask that cannot be read; ProgramError for a program without objects on the photo.
+    Raises UsageError where nothing is marked, all is, or an object is unknown; FileError for a mask that
+    cannot be read; ProgramError for a program without objects on the photo.
     """
     asked: InpaintOptions = changed(options or InpaintOptions(), changes, verb="inpaint")
-    hole = hole_from(photo, program, mask=mask, remove=remove, focal_mm=asked.focal_mm)
+    wanted = asked_for(photo, program, mask=mask, restore=restore, remove=remove, focal_mm=asked.focal_mm)
     flat = flat_of(photo, program, focal_mm=asked.focal_mm)
-    if flat.k1 is None:
-        return _filled(photo, flat.placed, hole, asked, progress)
+    hole = wanted.hole
     # A bent photo is filled where it is straight, and the hole's pixels are brought back. Around the hole as
     # much is filled as bringing back mixes in, beyond the photo's edge too.
     wider = np.ones((2 * _LENS_MARGIN_PX + 1,) * 2, np.uint8)
-    flat_hole = cv2.dilate(flat.marked(hole).astype(np.uint8), wider) > 0
-    found = _filled(flat.photo, flat.placed, flat_hole, asked, progress)
-    pixels = np.where(hole[:, :, None], flat.bent(found.pixels), photo.pixels)
-    return dataclasses.replace(found, photo=photo, pixels=pixels, hole=hole)
+    flat_hole = hole if flat.k1 is None else cv2.dilate(flat.marked(hole).astype(np.uint8), wider) > 0
+    found = Filled(flat.photo.pixels, np.zeros_like(flat_hole), np.zeros_like(flat_hole))
+    more = continued(flat.placed, flat.photo, hole=flat_hole)
+    if hole.any():
+        found = _filled(flat.photo, more.joined(flat.placed), flat_hole, asked, progress)
+    notes, pixels, gone = list[str](), found.pixels, np.zeros_like(flat_hole)
+    if count := len(more.index):
+        notes.append(
+            f"the pattern goes on through the hole: {count} "
+            f"{'object is' if count == 1 else 'objects are'} added that the program does not draw"
+        )
+    if wanted.removed:
+        ground, gone, said = _taken_away(flat.photo, flat.placed, flat_hole, wanted.removed)
+        pixels = np.where(gone[:, :, None], ground, pixels)
+        notes += [CHANGED, *said]
+    guess, strange = beside_hole(flat.photo, flat.placed, flat_hole | gone)
+    of_pattern = flat_hole & ~gone
+    parts = [found.unlike & ~gone, found.fallback & ~gone, guess & of_pattern, strange, gone]
+    if flat.k1 is not None:
+        pixels, parts = flat.bent(np.asarray(pixels, np.float32)), [_bent(flat, part) for part in parts]
+    unlike, fallback, guess, strange, gone = parts
+    hole = hole | (gone & photo.valid)
+    pixels = np.where(hole[:, :, None], pixels, photo.pixels).astype(np.float32)
+    reach_px = max(3.0, _BESIDE * _typical_pitch_px(flat.placed))
+    facts = facts_of(hole, unlike=unlike, guess=guess, strange=strange, ground=gone, reach_px=reach_px)
+    told = [one.sentence() for one in facts if one.note]
+    if len(told) > _MOST_TOLD:
+        told[_MOST_TOLD:] = [
+            f"{len(told) - _MOST_TOLD} more holes of which not all can come from the pattern"
+        ]
+    return Inpainted(
+        photo,
+        pixels,
+        hole,
+        asked.method,
+        unlike=float((unlike & hole).sum() / max(1, hole.sum())),
+        fallback=float((fallback & hole).sum() / max(1, hole.sum())),
+        removed=len(wanted.removed),
+        foreign=(unlike | guess) & hole,
+        only_pattern=asked.only_pattern,
+        holes=facts,
+        notes=(*notes, *found.notes, *told),
+        added=tuple((int(i), int(j)) for i, j in more.index),
+    )
 
 
-def hole_from(
-    photo: Image,
-    program: Program,
-    *,
-    mask: str | PathLike[str] | Mask | None,
-    remove: Sequence[str | tuple[int, int]],
-    focal_mm: float | None = None,
-) -> Mask:
-    """What is to be filled, bool [H, W]; the arguments and errors are those of `inpaint`."""
-    hole = np.zeros(photo.valid.shape, bool)
-    if isinstance(mask, np.ndarray):
-        if mask.shape != hole.shape or mask.dtype != np.bool_:
-            raise UsageError(f"a mask is bool {hole.shape}, not {mask.dtype} {mask.shape}")
-        hole |= mask
-    elif mask is not None:
-        hole |= read_mask(mask, photo.size)
-    if remove:
-        hole |= _cells(photo, program, remove, focal_mm=focal_mm)
-    if mask is None and not remove:
-        hole = ~photo.valid
-    if not hole.any():
-        raise UsageError("nothing is to be filled: give --mask FILE (white is filled) or --remove i,j")
-    if (hole | ~photo.valid).all():
-        raise UsageError("the hole takes all of the photo: nothing would be left to fill it from")
-    return hole
+def _bent(flat: Flat, mask: Mask) -> Mask:
+    """A mask of the flat photo as the lens shows it."""
+    return flat.bent(np.repeat(mask[:, :, None], 3, 2).astype(np.float32))[:, :, 0] > 0.5
 
 
-def _cells(
-    photo: Image, program: Program, remove: Sequence[str | tuple[int, int]], *, focal_mm: float | None
-) -> Mask:
-    """The cells of some objects on the photo, bool [H, W]; raises UsageError for one that is not there."""
-    camera = placed(program, photo, focal_mm=focal_mm).camera
-    listed = objects_of(program, None, PointsOptions(size=photo.size, focal_mm=camera.focal_mm)).objects
-    by_name = {found.name.upper(): found for found in listed}
-    by_index = {(found.i, found.j): found for found in listed}
-    hole = np.zeros(photo.valid.shape, np.uint8)
-    for asked in remove:
-        index = parse_index(asked) if isinstance(asked, str) else (asked[0], asked[1])
-        found = by_name.get(str(asked).strip().upper()) if index is None else by_index.get(index)
-        if found is None:
-            known = ", ".join([one.name for one in listed[:3]] + (["..."] if len(listed) > 3 else []))
-            raise UsageError(
-                f"there is no object {asked} on the photo: `p3i points` lists their names ({known}) and i, j"
-            )
-        if found.cell_px:
-            # In sixteenths of a pixel, so that the cell's outline is met as closely as pixels allow.
-            corners = np.rint(np.array(found.cell_px) * 16).astype(np.int32)
-            cv2.fillPoly(hole, [corners], 1, shift=4)
-    return hole > 0
+def _typical_pitch_px(laid: Placed) -> float:
+    """How far the next object lies from the one in the middle, in pixels."""
+    return pitch_px(laid, int(np.argmin(np.hypot(*(laid.points - np.median(laid.points, 0)).T))))
 
 
-def parse_index(text: str) -> tuple[int, int] | None:
-    """`i,j` as two whole numbers; None for anything else."""
-    found = re.fullmatch(r"\s*([+-]?\d{1,9})\s*,\s*([+-]?\d{1,9})\s*", text)
-    return None if found is None else (int(found[1]), int(found[2]))
+def _taken_away(
+    photo: Image, laid: Placed, hole: Mask, removed: Sequence[tuple[int, int]]
+) -> tuple[Floats, Mask, list[str]]:
+    """The straight photo with the ground under some objects, where those lay, and what to say of it.
+
+    What is in the hole tells nothing of the ground.
+    """
+    known = masked(photo, hole) if hole.any() else photo
+    cut = cutout(laid, known)
+    gone = covered(only(laid, removed), cut) & photo.valid
+    ground = cleared(known.pixels, known.valid, laid, cut, objects=gone)
+    return ground, gone, doubts(cut)
 
 
 def _filled(
     photo: Image, laid: Placed, hole: Mask, options: InpaintOptions, progress: Progress | None
-) -> Inpainted:
+) -> Filled:
     """The hole of a straight photo filled by the method asked for."""
     notes: list[str] = []
     if not laid.in_sight().any():
         notes.append("no object of the program lies on the photo: it shows nothing to fill the hole from")
-    more = continued(laid, photo, hole=hole)
-    if len(more.index):
-        notes.append(
-            f"the pattern goes on through the hole: {len(more.index)} "
-            f"{'object is' if len(more.index) == 1 else 'objects are'} added that the program does not draw"
-        )
-        laid = more.joined(laid)
     match options.method:
         case "npn":
             found = _by_network(photo, laid, hole, options, progress)
@@ -196,10 +219,7 @@ def _filled(
                 part
             )
             found = Filled(pixels, bare, bare, tuple(said))
-    unlike, fallback = (float(part.sum() / hole.sum()) for part in (found.unlike, found.fallback))
-    added = tuple((int(i), int(j)) for i, j in more.index)
-    said = (*notes, *found.notes)
-    return Inpainted(photo, found.pixels, hole, options.method, unlike, fallback, said, added)
+    return dataclasses.replace(found, notes=(*notes, *found.notes))
 
 
 def _by_network(

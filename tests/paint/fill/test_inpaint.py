@@ -12,7 +12,8 @@ from p3i import loads
 from p3i.errors import FileError, UsageError
 from p3i.evaluation.scenes import scene
 from p3i.paint.fill import light
-from p3i.paint.fill.inpaint import inpaint, parse_index
+from p3i.paint.fill.holes import parse_index
+from p3i.paint.fill.inpaint import inpaint
 from p3i.place.moves import moves
 from p3i.place.placed import placed
 from p3i.vision.image import Image, read_image
@@ -74,12 +75,12 @@ def test_without_a_mask_the_transparent_part_is_filled() -> None:
     assert np.abs(found.pixels - photo.pixels)[hole].mean() * 255 < 4
 
 
-def test_objects_are_removed_by_index_and_by_name() -> None:
+def test_objects_are_restored_by_index_and_by_name() -> None:
     photo, program = drawn(LATTICE), loads(LATTICE)
-    by_index = inpaint(photo, program, remove=["0,0"]).hole
+    by_index = inpaint(photo, program, restore=["0,0"]).hole
     assert by_index.sum() > 100
-    assert np.array_equal(inpaint(photo, program, remove=[(0, 0)]).hole, by_index)
-    assert np.array_equal(inpaint(photo, program, remove=["d5"]).hole, by_index)
+    assert np.array_equal(inpaint(photo, program, restore=[(0, 0)]).hole, by_index)
+    assert np.array_equal(inpaint(photo, program, restore=["d5"]).hole, by_index)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +111,9 @@ def test_every_method_tells_the_same_facts(method: str) -> None:
     soon = {"time_s": 0.1} if method == "npn" else {}
     found = inpaint(photo, loads(LATTICE), mask=hole, method=method, **soon)
     record = found.record()
-    assert set(record) == {"photo", "method", "filled", "unlike", "fallback", "added", "notes"}
+    assert set(record) == {
+        "photo", "method", "filled", "removed", "unlike", "fallback", "added", "holes", "notes",
+    }  # fmt: skip
     assert (record["method"], record["filled"], record["unlike"]) == (method, found.hole.sum(), 0)
     assert record["notes"] == list(found.notes)
 
