@@ -1,0 +1,58 @@
+"""The weights that ship with p3i: small, plain numbers, and those that the documents name."""
+
+import hashlib
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from painted import batch, scene
+
+from p3i.errors import FileError
+from p3i.paint.fill.npn import shipped
+from p3i.paint.fill.npn.network import PaintingNetwork, PatchDiscriminator, plain
+from p3i.paint.fill.npn.training import hole_error
+
+ROOT = Path(__file__).parents[4]
+
+
+def data() -> bytes:
+    return (resources.files("p3i.paint.fill.npn") / shipped.NAME).read_bytes()
+
+
+def test_the_file_is_that_of_the_documents_and_small() -> None:
+    assert hashlib.sha256(data()).hexdigest() == shipped.SHA256
+    assert shipped.SHA256 in (ROOT / "docs" / "npn.md").read_text(encoding="utf-8")
+    assert len(data()) < 2_000_000
+
+
+def test_it_holds_numbers_only(tmp_path: Path) -> None:
+    (tmp_path / "weights.npz").write_bytes(data())
+    with np.load(tmp_path / "weights.npz", allow_pickle=False) as arrays:
+        assert {arrays[name].dtype for name in arrays.files} == {np.dtype(np.float16)}
+
+
+def test_it_fits_the_networks_and_is_packed_alike() -> None:
+    generator, discriminator = PaintingNetwork(), PatchDiscriminator()
+    generator.load_state_dict(shipped.shipped()["generator"])
+    discriminator.load_state_dict(shipped.shipped()["discriminator"])
+    assert shipped.packed(generator, discriminator) == data()
+
+
+def test_a_file_that_was_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shipped, "SHA256", "0" * 64)
+    with pytest.raises(FileError, match="was changed"):
+        shipped.shipped()
+    monkeypatch.setattr(shipped, "NAME", "nowhere.npz")
+    with pytest.raises(FileError, match="lacks its file"):
+        shipped.shipped()
+
+
+def test_on_a_scene_that_it_has_not_seen_it_paints_better_than_a_weighted_mean() -> None:
+    network = PaintingNetwork()
+    network.load_state_dict(shipped.shipped()["generator"])
+    lessons = batch(scene())
+    with torch.no_grad():
+        said = hole_error(network(lessons).fill, lessons).mean()
+    assert said < 0.97 * hole_error(plain(lessons).fill, lessons).mean()
