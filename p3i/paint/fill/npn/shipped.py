@@ -15,7 +15,7 @@ from p3i.errors import FileError
 from p3i.paint.fill.npn.network import PaintingNetwork, PatchDiscriminator
 
 NAME = "weights.npz"
-SHA256 = "636a047d0b9732533f40d38a4d70c9ccafaee75391d74c09b556ccc4479293c2"
+SHA256 = "3162fac52084dc9e73fc613b86453352c0af41701c3e5bf26793ef7cc85aaaa0"
 """Of the file; docs/npn.md states it with the seeds that it was made from."""
 
 
