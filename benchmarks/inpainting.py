@@ -2,7 +2,7 @@
 
 python benchmarks/inpainting.py PHOTOS                       # an annotated set, as `p3i eval` takes it
 python benchmarks/inpainting.py PHOTOS --methods stack telea --every 3
-python benchmarks/inpainting.py PHOTOS --methods npn --steps 400 --out rows.jsonl
+python benchmarks/inpainting.py PHOTOS --methods npn --steps 60 --out rows.jsonl
 
 On each lattice photo 1, 2 and 4 whole cells of the annotation and a box of 1.2 cells are hidden, at places
 drawn from the seed, and only then, all of them unknown, the program is searched for. Photos on which it is
@@ -170,7 +170,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=1, help="take every Nth photo")
     parser.add_argument("--seconds", type=float, help="begin no further photo after so long")
     parser.add_argument("--holes", nargs="+", help="only holes of these names")
-    parser.add_argument("--steps", type=int, default=400, help="steps of training of npn")
+    parser.add_argument("--steps", type=int, default=60, help="steps of training of npn")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, help="write a JSON line for each result")
     asked = parser.parse_args()
