@@ -4,10 +4,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import torch
 
 from p3i import loads
-from p3i.paint.fill.npn.lessons import lessons
-from p3i.paint.fill.npn.window import Stack, Window, gather, window_of
+from p3i.paint.fill.npn.cells import Cells, cells_of
+from p3i.paint.fill.npn.lessons import lessons, teachers
+from p3i.paint.fill.npn.network import Batch
+from p3i.paint.fill.npn.stacks import pool_of
 from p3i.place.placed import Placed, placed
 from p3i.vision.image import Image
 
@@ -61,14 +64,15 @@ def scene() -> Scene:
     return Scene(Image(pixels, np.ones((height, width), bool)), laid, hole)
 
 
-def window(found: Scene) -> Window:
-    """The window of the scene's hole."""
-    return window_of(found.corrupted, found.placed, found.hole, working_px=48)
+def cells(found: Scene, *, hidden: bool = True) -> Cells:
+    """The scene's cells, its hole hidden or not."""
+    hole = found.hole if hidden else np.zeros_like(found.hole)
+    return cells_of(found.photo, found.placed, hole, hole, device=torch.device("cpu"))
 
 
-def stacks(found: Scene, *, count: int = 24) -> tuple[Stack, list[Stack], list[Stack]]:
-    """The hole's own stack, stacks to learn from, and stacks to judge by."""
-    seen = window(found)
-    own = gather(seen, seen.hole, seen.views[0], most=10)
-    assert own is not None
-    return own, *lessons(seen, count=count, most=6, seed=0)
+def batch(found: Scene, *, count: int = 16, seed: int = 0) -> Batch:
+    """Lessons of the scene, one batch."""
+    seen = cells(found)
+    pool = pool_of(seen, torch.arange(1))
+    outlines = torch.zeros(0, 1, seen.patch.height, seen.patch.width)
+    return lessons(seen, pool, teachers(seen, pool), outlines, count=count, seed=seed)[0]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
+from p3i.options.npn import STEPS
 from p3i.records import PhotoFocal, Spelt, check_focal
 
 Method = Literal["stack", "npn", "patchmatch"]
@@ -33,16 +34,17 @@ class InpaintOptions:
     method: Annotated[
         Method,
         "stack: a mean of aligned cells, in seconds; npn: the paper's neural painting network, trained on "
-        "this one photo, in minutes; patchmatch: PatchMatch guided by the program (extra `patchmatch`).",
+        "this one photo, in seconds; patchmatch: PatchMatch guided by the program (extra `patchmatch`).",
     ] = "stack"
-    steps: Annotated[int, "With npn: steps of training for each part of the hole.", Spelt(metavar="N")] = 400
+    steps: Annotated[int, "With npn: steps of training on the photo.", Spelt(metavar="N")] = STEPS
     time_s: Annotated[
         float | None,
         "With npn: stop training after this many seconds.",
         Spelt("--time", metavar="SECONDS"),
     ] = None
     checkpoint: Annotated[
-        Path | None, "With npn: a file that the training is kept in, and goes on from where it exists."
+        Path | None,
+        "With npn: a file that the photo's training is kept in, for any hole; it goes on from it.",
     ] = None
     seed: Annotated[int, "With npn and patchmatch: the seed of what is random.", Spelt(metavar="N")] = 0
     device: Annotated[

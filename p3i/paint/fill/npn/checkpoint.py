@@ -1,10 +1,9 @@
-"""The file that keeps a training, and what ties it to its photo, program, hole and options."""
+"""The file that keeps a photo's training, and what ties it to its photo, program and options."""
 
 import hashlib
 import io
 import pickle
 import zipfile
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,55 +12,48 @@ import torch
 from p3i.errors import FileError
 from p3i.files import check_writable, read_bytes, write_bytes
 from p3i.options.npn import NetworkOptions
+from p3i.paint.fill.npn.shipped import SHA256
 from p3i.paint.fill.npn.training import Training
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
 
-_VERSION = 2
-# These may change between two runs of one training.
-_FREE = ("steps", "time_s", "device", "threads", "checkpoint")
 
-
-def fingerprint(photo: Image, placed: Placed, hole: np.ndarray, options: NetworkOptions) -> str:
-    """Names all that a training depends on. What the `hole` [H, W] hides does not count."""
+def fingerprint(photo: Image, placed: Placed, options: NetworkOptions) -> str:
+    """Names all that a photo's one training depends on, but for the hole that it was begun for."""
     digest = hashlib.sha256()
-    known = photo.valid & ~hole
-    for array in (photo.pixels * known[:, :, None], known, placed.image_from_plane, placed.points):
+    for array in (
+        photo.pixels * photo.valid[:, :, None],
+        photo.valid,
+        placed.image_from_plane,
+        placed.points,
+    ):
         digest.update(np.ascontiguousarray(array).tobytes())
-    kept = {name: value for name, value in asdict(options).items() if name not in _FREE}
-    digest.update(repr((_VERSION, photo.pixels.shape, sorted(kept.items()))).encode())
+    digest.update(repr((SHA256, photo.pixels.shape, options.seed)).encode())
     return digest.hexdigest()
 
 
-def load(path: Path, key: str, place: int, training: Training) -> bool:
-    """Go on from a checkpoint, if there is one for hole number `place`; whether there was.
+def load(path: Path, key: str, training: Training) -> None:
+    """Go on from a checkpoint, if there is one.
 
-    Raises FileError for a file that is no checkpoint, or one of another photo, hole or options, and
+    Raises FileError for a file that is no checkpoint, one of another photo, program, seed or version, and
     for a place that cannot be written to.
     """
     check_writable(path, force=True)  # now, not after the first minutes
     if not path.exists():
-        return False
+        return
     saved = _read(path)
-    if saved.get("key") != key:
+    if saved["key"] != key or "training" not in saved:
         raise FileError(
-            f"the checkpoint {path} is of another photo, program, mask or options: name another file, "
-            "or remove it"
+            f"the checkpoint {path} is of another photo, program or seed, or of an earlier p3i: name another "
+            "file, or remove it"
         )
-    state = saved["holes"].get(place)
-    if state is not None:
-        training.restore(state)
-    return state is not None
+    training.restore(saved["training"])
 
 
-def save(path: Path, key: str, place: int, training: Training) -> None:
-    """Write the training of hole number `place`, keeping those of the others; whole or not at all.
-
-    Raises FileError where the file cannot be written.
-    """
-    holes = _read(path)["holes"] if path.exists() else {}
+def save(path: Path, key: str, training: Training) -> None:
+    """Write the training; whole or not at all. Raises FileError where the file cannot be written."""
     packed = io.BytesIO()
-    torch.save({"key": key, "holes": {**holes, place: training.state()}}, packed)
+    torch.save({"key": key, "training": training.state()}, packed)
     write_bytes(path, packed.getvalue(), force=True)
 
 
@@ -71,6 +63,6 @@ def _read(path: Path) -> dict:
         found = torch.load(io.BytesIO(read_bytes(path)), map_location="cpu", weights_only=True)
     except (RuntimeError, ValueError, EOFError, pickle.UnpicklingError, zipfile.BadZipFile):
         raise FileError(f"{path} is no checkpoint of a painting network, or it is cut off") from None
-    if not isinstance(found, dict) or not {"key", "holes"} <= set(found):
+    if not isinstance(found, dict) or "key" not in found:
         raise FileError(f"{path} is no checkpoint of a painting network")
     return found

@@ -1,110 +1,100 @@
 """What the network learns from: holes cut into the photo's other cells, where the truth is known.
 
-Most of them are the very hole that is to be painted, laid onto other cells; the others are boxes of 0.3 to
-1.2 cells and whole cells. Cells that any hole touches are never the target of a lesson.
+Most of them have the outline that is hidden in one of the cells to be painted, in place or shifted; the
+others are whole cells and boxes. All are cut at once, as tensors on the network's device.
 """
 
-import time
+from dataclasses import fields, replace
 
-import numpy as np
 import torch
+import torch.nn.functional as F
+from torch import Tensor
 
+from p3i.paint.fill.npn.cells import Cells
 from p3i.paint.fill.npn.network import Batch
-from p3i.paint.fill.npn.window import Stack, Window, gather
-from p3i.paint.fill.sources import Mask
+from p3i.paint.fill.npn.stacks import Pool, stacks_of
 
-# One in so many of the cells is kept to judge by.
-_JUDGE = 6
-# So many are tried to be cut however late it is.
-_FEWEST = 12
+# A cell can teach where so much of its own ground is known, and of its surroundings.
+_LEAST_OWN, _LEAST_AROUND = 0.7, 0.4
+# Of the lessons of a photo, so many have the outline that is to be painted; of these half stand as they do
+# there.
+_OWN = 0.6
+_LEAST_PX = 12
 # A step sees so many sources at most: the more, the slower, and a few teach as much.
 _AT_MOST = 6
+# So many lessons are cut at once.
+_AT_ONCE = 16
+
+
+def teachers(cells: Cells, pool: Pool) -> Tensor:
+    """The places in the pool whose cells can be learned from: all is known in them, and much around."""
+    own = torch.from_numpy(cells.cell).to(cells.device)[None]
+    known = pool.known[:, 0]
+    inside = (known * own).sum((1, 2)) / own.sum()
+    around = (known * ~own).sum((1, 2)) / (~own).sum().clamp(min=1)
+    return ((inside >= _LEAST_OWN) & (around >= _LEAST_AROUND)).nonzero()[:, 0]
 
 
 def lessons(
-    window: Window, *, count: int, most: int, seed: int, until: float | None = None
-) -> tuple[list[Stack], list[Stack]]:
-    """Stacks to learn from and stacks to judge by, of different cells, with at most so many sources each.
+    cells: Cells, pool: Pool, places: Tensor, outlines: Tensor, *, count: int, seed: int
+) -> list[Batch]:
+    """About `count` lessons cut into the cells at these places of the pool, a list of batches.
 
-    About `count` together; fewer, or none, where few cells are known, or where the clock (time.monotonic)
-    says it is after `until`.
+    `outlines` [T, 1, h, w] are those of the holes to be painted; none, [0, 1, h, w], where there are none
+    yet.
     """
-    chance = np.random.default_rng(seed)
-    known = [window.seen(view)[1] for view in window.views]
-    able = [place for place in range(1, len(known)) if _teaches(window.hole, known[place])]
-    if len(able) < 2:
-        return [], []
-    order = [able[place] for place in chance.permutation(len(able))]
-    judges = set(order[: max(1, len(order) // _JUDGE)])
-    learned: list[Stack] = []
-    judged: list[Stack] = []
-    for turn in range(2 * count):
-        late = until is not None and turn >= _FEWEST and time.monotonic() > until
-        if len(learned) + len(judged) >= count or late:
-            break
-        place = order[turn % len(order)]
-        cut = known[place] & _cut(window, chance, own=turn < len(order) or bool(chance.random() < 0.6))
-        found = gather(window, cut, window.views[place], most=most) if cut.sum() >= 4 else None
-        if found is not None:
-            (judged if place in judges else learned).append(found)
-    if not learned:
-        return judged, []
-    return learned, judged
+    chance = torch.Generator().manual_seed(seed)
+    if not len(places):
+        return []
+    turns = torch.cat(
+        [torch.randperm(len(places), generator=chance) for _ in range(-(-count // len(places)))]
+    )[:count]
+    holes = torch.cat([_cut(cells, outlines, chance) for _ in range(count)])
+    chosen = places.cpu()[turns]
+    found: list[Batch] = []
+    for start in range(0, count, _AT_ONCE):
+        part = chosen[start : start + _AT_ONCE].to(cells.device)
+        hidden = holes[start : start + _AT_ONCE].to(cells.device) * pool.known[part]
+        batch, _, able = stacks_of(cells, pool, pool.numbers[part], hidden)
+        able &= hidden.sum((1, 2, 3)) >= _LEAST_PX
+        if able.any():
+            found.append(part_of(batch, able.nonzero()[:, 0]))
+    return found
 
 
-def _teaches(hole: Mask, known: Mask) -> bool:
-    """Whether the truth under the hole [h, w] is known in a view, and some of its surroundings."""
-    return bool(known[hole].mean() >= 0.98 and known[~hole].mean() >= 0.4)
+def _cut(cells: Cells, outlines: Tensor, chance: torch.Generator) -> Tensor:
+    """One hole [1, 1, h, w], on the CPU."""
 
+    def draw(count: int) -> list[float]:
+        return torch.rand(count, generator=chance).tolist()
 
-def _cut(window: Window, chance: np.random.Generator, *, own: bool) -> Mask:
-    """A hole [h, w] in another view: the true one, perhaps shifted; else a box."""
-    hole, pitch = window.hole, window.pitch_px
-    height, width = hole.shape
-    if own:
-        # Straight from the task itself; some shifted, that the network does not learn one outline by heart.
-        if chance.random() < 0.5:
+    height, width = cells.cell.shape
+    kind, which, shifted, across, down = draw(5)
+    if len(outlines) and kind < _OWN:
+        hole = outlines[int(which * len(outlines))][None].cpu()
+        if shifted < 0.5:
             return hole
-        by = np.round(chance.uniform(-0.25, 0.25, 2) * pitch).astype(int)
-        moved = np.zeros_like(hole)
-        rows, columns = np.nonzero(hole)
-        rows, columns = rows + by[0], columns + by[1]
-        kept = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-        moved[rows[kept], columns[kept]] = True
-        return moved
-    rows, columns = np.nonzero(hole)
-    sides = np.maximum(2, np.round(chance.uniform(0.3, 1.2, 2) * pitch)).astype(int)
-    middle = chance.integers(len(rows))
-    top, left = rows[middle] - sides[0] // 2, columns[middle] - sides[1] // 2
-    box = np.zeros_like(hole)
-    box[max(0, top) : top + sides[0], max(0, left) : left + sides[1]] = True
+        reach = 0.25 * cells.pitch_px
+        return _moved(hole, round((2 * across - 1) * reach), round((2 * down - 1) * reach))
+    if kind > 0.85:
+        return torch.from_numpy(cells.cell)[None, None].float()
+    wide, high = (max(3, round((0.3 + 0.9 * side) * cells.pitch_px)) for side in (across, down))
+    left, top = (
+        round(at * side - size / 2)
+        for at, side, size in zip(draw(2), (width, height), (wide, high), strict=True)
+    )
+    box = torch.zeros(1, 1, height, width)
+    box[..., max(0, top) : max(0, top + high), max(0, left) : max(0, left + wide)] = 1
     return box
 
 
-def batch_of(stacks: list[Stack], *, device: torch.device) -> Batch:
-    """Stacks of one size as one batch; those with fewer sources get places that hold none."""
-    most = max(len(stack.weights) for stack in stacks)
+def _moved(hole: Tensor, across: int, down: int) -> Tensor:
+    return F.pad(hole, (across, -across, down, -down))
 
-    def planes(arrays: list[np.ndarray]) -> torch.Tensor:
-        return torch.from_numpy(np.stack(arrays)).float().movedim(-1, -3).contiguous().to(device)
 
-    def filled(array: np.ndarray) -> np.ndarray:
-        missing = most - len(array)
-        return np.concatenate([array, np.repeat(array[:1], missing, axis=0)]) if missing else array
-
-    def silent(array: np.ndarray) -> np.ndarray:
-        missing = np.zeros((most - len(array), *array.shape[1:]), array.dtype)
-        return np.concatenate([array, missing])
-
-    return Batch(
-        planes([stack.target for stack in stacks]),
-        planes([stack.hole[:, :, None] for stack in stacks]),
-        planes([stack.context[:, :, None] for stack in stacks]),
-        planes([filled(stack.sources) for stack in stacks]),
-        planes([filled(stack.lifts) for stack in stacks]),
-        planes([silent(stack.known)[..., None] for stack in stacks]),
-        torch.from_numpy(np.stack([silent(stack.weights) for stack in stacks])).float().to(device),
-    )
+def part_of(batch: Batch, places: Tensor) -> Batch:
+    """Those of a batch's stacks at these places."""
+    return Batch(*(getattr(batch, one.name)[places] for one in fields(Batch)))
 
 
 def varied(batch: Batch, generator: torch.Generator) -> Batch:
@@ -113,7 +103,7 @@ def varied(batch: Batch, generator: torch.Generator) -> Batch:
     Sources are left out by chance, so that no single one is relied on. Chance comes from `generator` (CPU).
     """
 
-    def draw(*shape: int) -> torch.Tensor:
+    def draw(*shape: int) -> Tensor:
         return torch.rand(*shape, generator=generator)
 
     flips = [axis for axis in (-1, -2) if float(draw(1)) < 0.5]
@@ -125,25 +115,27 @@ def varied(batch: Batch, generator: torch.Generator) -> Batch:
     noise = -torch.log(-torch.log(draw(size, count).clamp(1e-9, 1 - 1e-7)))
     liking = torch.log(batch.weights.cpu().clamp(min=1e-12)) + noise
     few = min(count, int(torch.randint(2, _AT_MOST + 1, (1,), generator=generator)))
-    some = _AT_MOST if float(draw(1)) < 0.7 else few
-    used = liking.topk(min(count, some), dim=1).indices.to(batch.weights.device)
+    some = min(count, _AT_MOST) if float(draw(1)) < 0.7 else few
+    used = liking.topk(some, dim=1).indices.to(batch.weights.device)
     weights = batch.weights.gather(1, used)
     weights = weights / weights.sum(1, keepdim=True)
     rows = torch.arange(size, device=used.device)[:, None]
 
-    def view(values: torch.Tensor) -> torch.Tensor:
+    def view(values: Tensor) -> Tensor:
         values = values.flip(flips) if flips else values
         return values.transpose(-1, -2) if turned else values
 
-    def coloured(values: torch.Tensor, shift: float) -> torch.Tensor:
+    def coloured(values: Tensor, shift: float) -> Tensor:
         return view(values.index_select(-3, colours.to(values.device))) * gain + shift
 
-    return Batch(
-        coloured(batch.target, light),
-        view(batch.hole),
-        view(batch.context),
-        coloured(batch.sources[rows, used], light),
-        coloured(batch.lifts[rows, used], 0.0),
-        view(batch.known[rows, used]),
-        weights,
+    return replace(
+        batch,
+        target=coloured(batch.target, light),
+        hole=view(batch.hole),
+        context=view(batch.context),
+        sources=coloured(batch.sources[rows, used], light),
+        lift=coloured(batch.lift, 0.0),
+        known=view(batch.known[rows, used]),
+        weights=weights,
+        asked=view(batch.asked),
     )

@@ -20,7 +20,7 @@ WIDTHS = (16, 32, 32)
 """Channels of the three scales."""
 _KEY = 16
 _INPUTS = 16
-_PLANES = ("target", "hole", "context", "sources", "lifts", "known")
+_PLANES = ("target", "hole", "context", "sources", "lift", "known", "asked")
 # A source that is unknown at a pixel gets this logit there.
 _NEVER = -30.0
 
@@ -28,16 +28,18 @@ _NEVER = -30.0
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
     """Stacks of one size: `target` [B, 3, h, w] with the truth in the hole where known, `hole` and `context`
-    [B, 1, h, w], `sources` and `lifts` [B, K, 3, h, w], `known` [B, K, 1, h, w], `weights` [B, K] (0 for a
-    place that holds no source). The network reads the target in the context only."""
+    [B, 1, h, w], `sources` [B, K, 3, h, w] in the hole's light, the membrane `lift` [B, 3, h, w], `known`
+    [B, K, 1, h, w], `weights` [B, K] (0 for a place that holds no source), `asked` [B, 1, h, w] what is
+    painted of the hole. The network reads the target in the context only."""
 
     target: Tensor
     hole: Tensor
     context: Tensor
     sources: Tensor
-    lifts: Tensor
+    lift: Tensor
     known: Tensor
     weights: Tensor
+    asked: Tensor
 
     def seen(self, view: Callable[[Tensor], Tensor]) -> "Batch":
         """The batch with each of its planes [..., h, w] seen another way."""
@@ -46,7 +48,7 @@ class Batch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Painted:
-    """What the network says: `attention` [B, K, 1, h, w] (sum 1), `strength` [B, 1, h, w] of the membranes,
+    """What the network says: `attention` [B, K, 1, h, w] (sum 1), `strength` [B, 1, h, w] of the membrane,
     `correction` [B, 3, h, w], and the patch that they make, `fill` [B, 3, h, w]."""
 
     attention: Tensor
@@ -57,7 +59,7 @@ class Painted:
 
 def blend(batch: Batch, attention: Tensor, strength: Tensor, correction: Tensor) -> Tensor:
     """The patch [B, 3, h, w] of an attention, a strength and a correction."""
-    return (attention * (batch.sources + strength[:, None] * batch.lifts)).sum(1) + correction
+    return (attention * batch.sources).sum(1) + strength * batch.lift + correction
 
 
 def plain_logits(batch: Batch) -> Tensor:
@@ -132,27 +134,6 @@ class PaintingNetwork(nn.Module):
         return Painted(attention, strength, correction, blend(batch, attention, strength, correction))
 
 
-def painted_all_ways(network: PaintingNetwork, batch: Batch) -> Painted:
-    """What a network says of a batch and of its seven mirrorings and turns, in the mean; no gradients."""
-    said: list[tuple[Tensor, ...]] = []
-    with torch.no_grad():
-        for turned in (False, True):
-            for axes in ((), (-1,), (-2,), (-1, -2)):
-
-                def there(values: Tensor, axes: tuple[int, ...] = axes, turned: bool = turned) -> Tensor:
-                    values = values.flip(axes) if axes else values
-                    return values.transpose(-1, -2) if turned else values
-
-                def back(values: Tensor, axes: tuple[int, ...] = axes, turned: bool = turned) -> Tensor:
-                    values = values.transpose(-1, -2) if turned else values
-                    return values.flip(axes) if axes else values
-
-                found = network(batch.seen(there))
-                said.append((back(found.attention), back(found.strength), back(found.correction)))
-        attention, strength, correction = (torch.stack(parts).mean(0) for parts in zip(*said, strict=True))
-        return Painted(attention, strength, correction, blend(batch, attention, strength, correction))
-
-
 class PatchDiscriminator(nn.Module):
     """Says of each place of a completed patch how real it looks; it is told where the hole was."""
 
@@ -174,7 +155,7 @@ class PatchDiscriminator(nn.Module):
 def _inputs(batch: Batch) -> Tensor:
     """What each source is encoded from [B, K, 16, h, w]: itself, the corrupted patch, and the set's mean."""
     attention = torch.softmax(plain_logits(batch), 1)
-    lifted = batch.sources + batch.lifts
+    lifted = batch.sources + batch.lift[:, None]
     mean = (attention * lifted).sum(1)
     spread = (attention * (lifted - mean[:, None]) ** 2).sum(1).mean(1, keepdim=True).add(1e-6).sqrt()
     apart = batch.context[:, None] * batch.known * (batch.sources - batch.target[:, None])
@@ -184,7 +165,7 @@ def _inputs(batch: Batch) -> Tensor:
         [
             4 * (lifted - mean[:, None]) * batch.known,
             4 * apart,
-            4 * batch.lifts,
+            (4 * batch.lift)[:, None].expand_as(lifted),
             batch.known,
             trust.expand(shape),
             (2 * mean - 1)[:, None].expand(-1, shape[1], -1, -1, -1),

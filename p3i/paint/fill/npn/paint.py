@@ -1,10 +1,8 @@
 """`paint`: the neural painting network from a photo and a hole to the filled photo."""
 
+import dataclasses
 import time
-from dataclasses import dataclass
-from typing import Literal
 
-import cv2
 import numpy as np
 import torch
 
@@ -12,21 +10,31 @@ from p3i.errors import UsageError
 from p3i.options.npn import NetworkOptions
 from p3i.paint.fill.filled import Filled, share_text
 from p3i.paint.fill.npn import checkpoint
-from p3i.paint.fill.npn.lessons import batch_of, lessons
-from p3i.paint.fill.npn.network import Painted, painted_all_ways, plain
-from p3i.paint.fill.npn.training import EVERY, Progress, begun, train
-from p3i.paint.fill.npn.window import gather, window_of
+from p3i.paint.fill.npn.cells import Cells, cells_of, finer, laid
+from p3i.paint.fill.npn.compose import Task, painted
+from p3i.paint.fill.npn.judge import judged
+from p3i.paint.fill.npn.lessons import lessons, teachers
+from p3i.paint.fill.npn.network import PaintingNetwork
+from p3i.paint.fill.npn.shipped import shipped
+from p3i.paint.fill.npn.stacks import pool_of
+from p3i.paint.fill.npn.training import Progress, begun, train
 from p3i.paint.fill.sources import Floats, Ground, Mask
-from p3i.paint.fill.stack import fill_by_stack, mixed
+from p3i.paint.fill.stack import fill_by_stack
+from p3i.place.moves import nearest
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
 from p3i.vision.threads import limited_threads
-from p3i.vision.warp import taken
+from p3i.vision.warp import sample
 
-# Of the change that held-out cells ask for, so much is made: they are few, and choose weights that suit them.
-# Measured (docs/npn.md): all of it wins as often, but where it loses it loses twice as much.
-_TAKEN = 0.5
+# So many lessons are cut into a photo.
+_LESSONS = 64
+# The shipped weights are moved gently: a photo has few cells to learn from.
+_RATE = 5e-4
+# Fewer objects than this are no pattern to learn from.
+_FEWEST = 4
+# A part of a hole is a sliver where it has less than this share of the pixels of the largest.
+_SLIVER = 0.2
 
 
 def paint(
@@ -39,123 +47,148 @@ def paint(
 ) -> Filled:
     """The photo [H, W, 3] float32 with the hole (bool [H, W]) filled; pixels outside stay bit-identical.
 
-    The network starts from the stack's fill and adds what it has learned. Each part of the hole that hangs
-    together is learned for on its own, with an equal share of the time; a part that too few other cells show
-    stays as the stack fills it, and `notes` says so. Pixels of the hole are never read. `progress` is told
-    the step, of how many, and the latest mean L1 (0 to 255). Raises ValueError for a hole of another size,
-    UsageError for a device that is not there, FileError for a checkpoint of another photo and hole.
+    One network is trained on the photo, from the weights that p3i ships with, and paints every hidden cell.
+    Cells that it never learned from are filled by it and by the stack too: where that does not say for sure
+    that it is better, the stack's fill stands, and `notes` and `fallback` tell. Pixels of the hole are never
+    read. `progress` is told the step, of how many, and the latest mean L1 (0 to 255). Raises ValueError for a
+    hole of another size, UsageError for a device that is not there, FileError for a checkpoint of another
+    photo.
     """
     if hole.shape != photo.valid.shape or hole.dtype != np.bool_:
         raise ValueError(f"the hole is bool {photo.valid.shape}, not {hole.dtype} {hole.shape}")
-    device = _device(options.device)
-    result, bare = fill_by_stack(photo.pixels, photo.valid, hole, placed)
-    untaught, useless = bare.copy(), np.zeros_like(hole)
-    filled = Image(result.copy(), photo.valid & ~hole)
-    key = checkpoint.fingerprint(photo, placed, hole, options) if options.checkpoint else ""
-    begin = time.monotonic()
-    count, labels = cv2.connectedComponents(hole.astype(np.uint8), connectivity=8)
+    device = device_of(options.device)
     with limited_threads(options.threads):
-        for place in range(1, count):
-            part = labels == place
-            until = None if options.time_s is None else begin + options.time_s * place / (count - 1)
-            turn = _Turn(place, count - 1, key, until, device, progress)
-            outcome = _change(filled, placed, part, options, turn)
-            if isinstance(outcome, str):
-                (untaught if outcome == "untaught" else useless)[part] = True
-            else:
-                result[part] = np.clip(result[part] + outcome, 0, 1)
+        result, bare = fill_by_stack(photo.pixels, photo.valid, hole, placed)
+        stack = Image(result.copy(), photo.valid & ~hole)
+        outcome = _by_network(photo, stack, bare, placed, hole, options, device, progress)
+    if isinstance(outcome, str):
+        left, why = hole & ~bare, outcome
+    else:
+        fill, by_it = outcome
+        result[by_it] = fill
+        left, why = hole & ~bare & ~by_it, "no other cell shows the like of it"
     notes: list[str] = []
     if of_hole := share_text(bare, hole):
         notes.append(f"for {of_hole} the program has nothing like it: the surroundings are continued")
-    if of_hole := share_text(untaught & ~bare, hole):
-        notes.append(
-            f"for {of_hole} too few other cells show the like to learn from: the stack's fill stands"
-        )
-    if of_hole := share_text(useless & ~bare, hole):
-        notes.append(f"for {of_hole} the network learned nothing that helps: the stack's fill stands")
-    return Filled(result, bare, untaught | useless, tuple(notes))
+    if of_hole := share_text(left, hole):
+        notes.append(f"for {of_hole} {why}: the stack's fill stands")
+    return Filled(result, bare, bare | left, tuple(notes))
 
 
-@dataclass(frozen=True, slots=True)
-class _Turn:
-    """Which part of the hole it is, of how many, the checkpoint's key, and the clock's end for it."""
+def _by_network(
+    photo: Image,
+    stack: Image,
+    bare: Mask,
+    placed: Placed,
+    hole: Mask,
+    options: NetworkOptions,
+    device: torch.device,
+    progress: Progress | None,
+) -> "tuple[Floats, Mask] | str":
+    """What is painted over the stack's fill: colours [L, 3] and where [H, W]; or why nothing is.
 
-    place: int
-    parts: int
-    key: str
-    until: float | None
-    device: torch.device
-    progress: Progress | None
-
-    def told(self, step: int, steps: int, error: float) -> None:
-        if self.progress is not None:
-            self.progress((self.place - 1) * steps + step, self.parts * steps, error)
-
-
-def _change(
-    filled: Image, placed: Placed, part: Mask, options: NetworkOptions, turn: _Turn
-) -> "Floats | Literal['untaught', 'useless']":
-    """What the network adds [L, 3] to the stack's fill of a part [H, W] of the hole, or why it adds nothing.
-
-    `filled` is the photo with that fill, where it is not valid.
+    `stack` is the photo with that fill, where it is not valid.
     """
-    window = window_of(filled, placed, part, working_px=options.working_px)
-    stack = gather(window, window.hole, window.views[0], most=options.sources)
-    if stack is None:
-        return "untaught"
-    training = begun(seed=options.seed, device=turn.device)
-    path = options.checkpoint
+    too_few = "too few other cells show the like to learn from"
+    if placed.in_sight().sum() < _FEWEST:
+        return too_few
+    seen = Image(stack.pixels, photo.valid)
+    cells = cells_of(seen, placed, hole, bare, device=device)
+    tasks = tasks_of(cells, placed, hole)
+    if not tasks:
+        return too_few
+    numbers = torch.tensor([task.number for task in tasks], device=device)
+    # What the stack filled is no lesson.
+    certain = cells.without(hole)
+    jury = judged(photo, placed, hole, certain, pool_of(certain, numbers), tasks, seed=options.seed)
+    if jury is None:
+        return too_few
+    taught, fine = certain.without(jury.hidden), finer(cells, seen, hole, bare)
+    network = _trained(photo, placed, taught, jury.numbers, tasks, options, device, progress)
+    mix = jury.verdict(network, taught, fine.without(hole | jury.hidden))
+    if mix == 0:
+        return "the network is not surer than the stack on cells that it did not learn from"
+    ground = Ground.of(photo.pixels, photo.valid & ~hole)
+    filled, by_it = stack.pixels.copy(), np.zeros_like(hole)
+    pool = pool_of(cells, numbers)
+    for task, (colours, seen) in zip(tasks, painted(network, cells, fine, pool, ground, tasks), strict=True):
+        columns, rows = task.points[seen].astype(int).T
+        filled[rows, columns] += mix * (colours[seen] - filled[rows, columns])
+        by_it[rows, columns] = True
+    by_it &= ~bare
+    return filled[by_it], by_it
+
+
+def _trained(
+    photo: Image,
+    placed: Placed,
+    cells: Cells,
+    kept: torch.Tensor,
+    tasks: list[Task],
+    options: NetworkOptions,
+    device: torch.device,
+    progress: Progress | None,
+) -> PaintingNetwork:
+    """The photo's network; the cells `kept` [J] to judge by are hidden in `cells`, and no lesson is cut
+    there."""
+    training = begun(seed=options.seed, device=device, rate=_RATE, weights=shipped())
+    until = None if options.time_s is None else time.monotonic() + options.time_s
+    path, save = options.checkpoint, None
     if path is not None:
-        checkpoint.load(path, turn.key, turn.place, training)
-    # A training that ended between two judgements is judged at its end, each time it is read back.
-    if options.steps > training.step or training.step % EVERY:
-        # A third of the time for cutting lessons is much; a photo of few and small cells takes a second.
-        now = time.monotonic()
-        stop = None if turn.until is None else now + (turn.until - now) / 3
-        learned, judged = lessons(
-            window, count=options.examples, most=options.sources, seed=options.seed, until=stop
-        )
-        if not learned:
-            return "untaught"
-        train(
-            training,
-            learned,
-            judged,
-            steps=options.steps,
-            seed=options.seed,
-            adversarial=options.adversarial,
-            until=turn.until,
-            save=None if path is None else lambda state: checkpoint.save(path, turn.key, turn.place, state),
-            progress=turn.told,
-        )
-    if not training.best_weights or training.best_share == 0:
-        return "useless"
-    training.mean.load_state_dict(training.best_weights)
-    batch = batch_of([stack], device=turn.device)
-    ground, found = Ground.of(filled.pixels, filled.valid), [window.on_photo(one) for one in stack.found]
-    points = np.argwhere(part)[:, ::-1].astype(float)
-    at, _ = project(np.linalg.inv(window.views[0]) @ window.from_photo, points)
-
-    def composed(said: Painted) -> Floats:
-        """What was said on the window's pixels, as colours [L, 3] of the photo's.
-
-        Attention, membranes and correction are smooth enough to be magnified; the sources are read anew, so
-        that detail finer than the window's is kept. Where none shows the ground there is nothing to tell of.
-        """
-        attention = np.stack([taken(plane, at) for plane in said.attention[0, :, 0].cpu().numpy()])
-        smooth = (said.fill - (said.attention * batch.sources).sum(1))[0].movedim(0, -1).cpu().numpy()
-        colours, weight = mixed(points, ground, found, attention, sharp=True)
-        return np.where((weight > 1e-2)[:, None], colours + taken(np.ascontiguousarray(smooth), at), 0)
-
-    before, after = composed(plain(batch)), composed(painted_all_ways(training.mean, batch))
-    # A correction of one mean of the sources is no correction of another: where the stack's fill is farther
-    # from the mean that the network started from than this was wrong on other cells, less of it is taken.
-    apart = float(np.abs(np.clip(before, 0, 1) - filled.pixels[part]).mean())
-    trust = _TAKEN * training.best_share * min(1.0, training.best_error / max(apart, 1e-6))
-    return (trust * (after - before)).astype(np.float32)
+        key = checkpoint.fingerprint(photo, placed, options)
+        checkpoint.load(path, key, training)
+        save = lambda state: checkpoint.save(path, key, state)  # noqa: E731
+    if training.step < options.steps:
+        numbers = torch.tensor([task.number for task in tasks], device=device)
+        pool = pool_of(cells, numbers)
+        able = teachers(cells, pool)
+        able = able[~torch.isin(pool.numbers[able], kept)]
+        outlines = torch.stack([task.outline for task in tasks])
+        learned = lessons(cells, pool, able, outlines, count=_LESSONS, seed=options.seed)
+        if learned:
+            train(
+                training,
+                learned,
+                steps=options.steps,
+                seed=options.seed,
+                until=until,
+                save=save,
+                progress=progress,
+            )
+    return training.mean
 
 
-def _device(name: str) -> torch.device:
+def tasks_of(cells: Cells, placed: Placed, hole: Mask) -> list[Task]:
+    """The hidden cells: the hole split by the program's centres, as far as each one's patch reaches."""
+    points = np.argwhere(hole)[:, ::-1].astype(float)
+    on_plane, front = project(np.linalg.inv(placed.image_from_plane), points)
+    own = np.where(front, nearest(placed, on_plane), -1)
+    # A sliver of a cell is painted with the largest part beside it: alone it would hang on that one's fill.
+    numbers, counts = np.unique(own[own >= 0], return_counts=True)
+    large = numbers[counts >= _SLIVER * counts.max(initial=0)]
+    owners = dataclasses.replace(placed, points=placed.points[large], index=placed.index[large])
+    own = np.where(front, large[nearest(owners, on_plane)] if len(large) else -1, -1)
+    order = np.argsort(own, kind="stable")
+    found: list[Task] = []
+    marked = torch.from_numpy(hole.astype(np.float32))[None]
+    photo_from_small = torch.from_numpy(np.linalg.inv(cells.from_photo))
+    plane_from_photo = np.linalg.inv(placed.image_from_plane)
+    for part in np.split(order, np.flatnonzero(np.diff(own[order])) + 1):
+        number = int(own[part[0]]) if len(part) else -1
+        if number < 0 or not bool(torch.isfinite(cells.views[number]).all()):
+            continue
+        # A patch's pixel is hidden where the photo's pixel nearest to it is, and it is this cell's own.
+        at, seen = laid(photo_from_small @ cells.views[number].cpu(), cells.patch)
+        ground, _ = project(plane_from_photo, at.numpy().reshape(-1, 2).astype(float))
+        mine = torch.from_numpy(large[nearest(owners, ground)] == number).reshape(seen.shape)
+        outline = (sample(marked, at)[..., 0] > 0.01) & seen & mine
+        if outline.any():
+            found.append(Task(number, outline.float()[None], points[part]))
+    return found
+
+
+def device_of(name: str) -> torch.device:
+    """The device of that name. Raises UsageError where there is none."""
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     try:
