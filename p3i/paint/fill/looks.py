@@ -97,7 +97,7 @@ def _likened(
     for piece in pieces:
         left, top, right, bottom = piece.box
         here = (labels[top:bottom, left:right] == piece.number) & asked[top:bottom, left:right]
-        points = (np.argwhere(here)[:, ::-1] + np.array([left, top], float))[::every]
+        points = (np.argwhere(here)[:, ::-1] + np.array([left, top])).astype(float)[::every]
         plane_moves = moves(placed, piece.target)
         away = np.hypot(*(centers - centers[piece.target]).T)
         usable = placed.in_sight() & np.isfinite(plane_moves).all((1, 2))

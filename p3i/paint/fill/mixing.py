@@ -67,7 +67,7 @@ def painted(
         total += colours * counts[..., None]
         weight += counts
         shown.append(_shown(source.misfit, colours, known, inside, best=shown))
-    mean = total / np.maximum(weight, 1e-9)[..., None]
+    mean = (total / np.maximum(weight, 1e-9)[..., None]).astype(np.float32)
     if len(shown) > 1:
         _sharpen(mean, shown, inside)
     return mean, weight
@@ -133,4 +133,5 @@ def _energy(colours: Floats, where: Mask, other: Floats | None = None) -> float:
 def feathered(inside: Mask, radius: int) -> Floats:
     """A mask's own weight near its rim, so that the weights of pieces side by side add up to 1."""
     size = 2 * radius + 1
-    return cv2.blur(inside.astype(np.float32), (size, size), borderType=cv2.BORDER_CONSTANT)
+    weights = cv2.blur(inside.astype(np.float32), (size, size), borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(weights, np.float32)

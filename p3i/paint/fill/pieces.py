@@ -58,7 +58,7 @@ def drawn_on(placed: Placed) -> NDArray[np.uint8]:
     most = 4.0 * max(placed.size.width, placed.size.height)
     for outline in pixels[front.all(1) & (np.abs(pixels) < most).all((1, 2))]:
         cv2.fillPoly(drawn, [np.rint(outline * 16).astype(np.int32)], 1, shift=4)
-    return cv2.dilate(drawn, np.ones((2 * _SLACK_PX + 1,) * 2, np.uint8))
+    return np.asarray(cv2.dilate(drawn, np.ones((2 * _SLACK_PX + 1,) * 2, np.uint8)), np.uint8)
 
 
 def pieces_of(

@@ -143,16 +143,18 @@ class Source:
         ends = np.array([(0, 0), (size[0], 0), (0, size[1]), size], float)
         if not project(matrix, ends)[1].all():
             return None
-        how = {"flags": cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, "borderMode": cv2.BORDER_CONSTANT}
-        known = np.asarray(cv2.warpPerspective(ground.inwards, matrix, size, **how), np.float32)
+
+        def read(plane: NDArray, how: int, border: int) -> NDArray:
+            flags = how | cv2.WARP_INVERSE_MAP
+            return np.asarray(cv2.warpPerspective(plane, matrix, size, flags=flags, borderMode=border))
+
+        known = read(ground.inwards, cv2.INTER_LINEAR, cv2.BORDER_CONSTANT).astype(np.float32)
         np.minimum(known / np.float32(max(1.0, min(fading_px, _DEEPEST))), 1, out=known)
         if drawn is not None:
-            how["flags"] = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-            known *= cv2.warpPerspective(drawn, matrix, size, **how)
+            known *= read(drawn, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT)
         if not known.any():
             return None
-        how = {"flags": cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP, "borderMode": cv2.BORDER_REPLICATE}
-        colours = np.asarray(cv2.warpPerspective(ground.pixels, matrix, size, **how), np.float32)
+        colours = read(ground.pixels, cv2.INTER_CUBIC, cv2.BORDER_REPLICATE).astype(np.float32)
         colours *= self.gain.astype(np.float32)
         colours += self.offset.astype(np.float32)
         return colours, known

@@ -98,7 +98,7 @@ def _points(piece: Piece, labels: NDArray[np.int32], hole: Mask) -> Array:
     """The pixels [L, 2] of a piece."""
     left, top, right, bottom = piece.box
     here = (labels[top:bottom, left:right] == piece.number) & hole[top:bottom, left:right]
-    return np.argwhere(here)[:, ::-1] + np.array([left, top], float)
+    return (np.argwhere(here)[:, ::-1] + np.array([left, top])).astype(float)
 
 
 def _fill(

@@ -130,7 +130,7 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
             pixels, known, at.reshape(*flat, 2), ahead.reshape(flat), spacing.reshape(flat),
             box=Box(0, 1, 0, 1), side=side,
         )  # fmt: skip
-        seen = found.seen.reshape(count, side, side) & (inside > 0) & usable[:, None, None]
+        seen = found.seen.reshape(count, side, side) & (inside > 0) & np.asarray(usable)[:, None, None]
         return found.values.transpose(1, 2, 0).reshape(count, side, side, 3), seen
 
     offs, most = np.zeros((count, 2)), _MOST_OFF * float((high - low).min())
@@ -223,7 +223,7 @@ def _mean_of(lit: Floats, shown: Mask, near: Floats) -> Floats:
     near = near + np.float32(1e-6)
     weight = near @ shown.astype(np.float32)
     total = near @ (lit * shown[..., None]).reshape(len(lit), -1)
-    return total.reshape(len(near), -1, 3) / np.maximum(weight, 1e-9)[..., None]
+    return (total.reshape(len(near), -1, 3) / np.maximum(weight, 1e-9)[..., None]).astype(np.float32)
 
 
 def _told(places: Array, values: Array, surely: Array, towards: Array, spacing: float) -> Field:
