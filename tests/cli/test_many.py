@@ -24,7 +24,7 @@ VERBS: dict[str, tuple[list[str], str]] = {
     "rectify": ([], ".png"),
     "tile": ([], ".png"),
     "inpaint": (["--remove", "0,0"], ".png"),
-    "extend": (["--by", "4"], ".png"),
+    "extend": (["--by", "4", "--beyond", "continue"], ".png"),
     "edit": ([], ".png"),
     "points": ([], ".csv"),
     "score": ([], ".txt"),

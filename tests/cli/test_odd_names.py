@@ -33,7 +33,7 @@ COMMANDS = [
     "rectify a.png a.p3p -o out.png --json {}",
     "inpaint a.png a.p3p --mask {} -o out.png",
     "inpaint a.png a.p3p --mask a.png --method npn --checkpoint {} -o out.png",
-    "extend a.png a.p3p --by 5% -o {}.png",
+    "extend a.png a.p3p --by 5% --beyond continue -o {}.png",
     "edit a.png a.p3p {} -o out.png",
     "points {}",
     "points a.p3p --image {}",

@@ -20,7 +20,7 @@ TAKES: dict[str, str] = {
     "rectify": "photo.png PROG -o out.png",
     "tile": "photo.png PROG -o out.png",
     "inpaint": "photo.png PROG --remove 0,0 -o out.png",
-    "extend": "photo.png PROG --by 4 -o out.png",
+    "extend": "photo.png PROG --by 4 --beyond continue -o out.png",
     "edit": "photo.png PROG grid.p3p -o out.png",
     "points": "photo.png PROG -o out.csv",
     "score": "photo.png PROG",

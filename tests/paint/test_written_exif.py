@@ -50,7 +50,7 @@ def exif_of(picture: Picture, *, kind: str = "jpg") -> dict[int, object]:
 
 
 def widened(photo: Image, by: Margins, program: Program = PROGRAM) -> Picture:
-    return extend(photo, program, by=by).paint()
+    return extend(photo, program, by=by, beyond="continue").paint()
 
 
 STAYING: dict[str, Callable[[Image], Picture]] = {
