@@ -206,9 +206,10 @@ def find_marred(
 ) -> "Marred":
     """What of the pattern on `photo` differs from all other cells: a stain, a broken tile, a sign in front.
 
-    Nothing is filled. `changes` are fields of FindOptions. The result has `mask` (bool [H, W], for `inpaint`),
-    `mars`, `overlay()`, `save(path)`, `record()` and `notes`. Raises FileError, ParseError, UsageError where
-    too few cells are seen, ProgramError for a program without objects on the photo, and NoPatternError.
+    Nothing is filled. `changes` are fields of FindOptions. The result has `mask` (bool [H, W], as `inpaint`
+    takes it), `mars`, `overlay()`, `save(path)`, `record()` and `notes`. Raises FileError, ParseError,
+    UsageError where too few cells are seen, ProgramError for a program without objects on the photo, and
+    NoPatternError.
     """
     asked = changed(options or FindOptions(), changes, verb="find_marred")
     from p3i.paint.fill.found import find_marred as look

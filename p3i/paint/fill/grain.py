@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_FINEST_PX = 0.7
+# Bands from so many pixels to so many: what is coarser is light, and blurs of large pictures take long.
+_FINEST_PX, _COARSEST_PX = 0.7, 8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,9 +28,9 @@ class Grain:
 
     @classmethod
     def of(cls, detail: Floats, known: Mask, *, most_px: float) -> "Grain":
-        """The grain of `detail` where it is `known`, in bands up to `most_px` pixels."""
+        """The grain of `detail` where it is `known`, in bands up to `most_px` pixels or less."""
         sigmas = [_FINEST_PX]
-        while sigmas[-1] * 2 <= most_px:
+        while sigmas[-1] * 2 <= min(most_px, _COARSEST_PX):
             sigmas.append(sigmas[-1] * 2)
         values = np.where(known[:, :, None], detail, np.float32(0))
         white = np.random.default_rng(0).standard_normal((256, 256)).astype(np.float32)
