@@ -54,25 +54,34 @@ def seam_of(pixels: np.ndarray, known: np.ndarray, *, down: bool) -> Seam:
     return Seam(*x, *_differences(pixels.transpose(1, 0, 2), known.T))
 
 
-def wrapped(pixels: np.ndarray, known: np.ndarray, size: Size) -> tuple[np.ndarray, np.ndarray]:
+def wrapped(
+    pixels: np.ndarray, known: np.ndarray, size: Size, *, grain: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """A tile [H, W, 3] of `size`, and what of it is known, from a larger piece.
 
     `pixels` [H + a, W + b, 3] and `known` hold a rows and b columns more, none perhaps: what lies beyond the
-    far sides is blended into the near sides, which it continues.
+    right and lower sides is blended into the near sides, which it continues. So is `grain`, which is added:
+    where two grains meet, which have nothing to do with each other, the blend is as strong as either.
     """
     found, seen = _folded(pixels, known, size.width)
     found, seen = _folded(found.transpose(1, 0, 2), seen.T, size.height)
+    if grain is not None:
+        own, own_seen = _folded(grain, known, size.width, strong=True)
+        found = found + _folded(own.transpose(1, 0, 2), own_seen.T, size.height, strong=True)[0]
     return np.ascontiguousarray(found.transpose(1, 0, 2)), np.ascontiguousarray(seen.T)
 
 
-def _folded(pixels: np.ndarray, known: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """The first `width` columns, with those beyond blended over the first."""
+def _folded(
+    pixels: np.ndarray, known: np.ndarray, width: int, *, strong: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """The first `width` columns, with those beyond blended over the first; `strong` keeps their variance."""
     extra = pixels.shape[1] - width
     found, seen = pixels[:, :width].copy(), known[:, :width].copy()
     if extra:
         own, other = seen[:, :extra], known[:, width:]
         share = np.where(own & other, _ramp(extra)[None, :], own.astype(np.float32))[:, :, None]
-        found[:, :extra] = share * found[:, :extra] + (1 - share) * pixels[:, width:]
+        lost = np.sqrt(share**2 + (1 - share) ** 2) if strong else np.float32(1)
+        found[:, :extra] = (share * found[:, :extra] + (1 - share) * pixels[:, width:]) / lost
         seen[:, :extra] = own | other
     return found, seen
 
