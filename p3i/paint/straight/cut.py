@@ -9,8 +9,8 @@ _NEAR, _ASIDE = 0.04, 0.02
 """An edge is beside a cut within about this share of a side, and counts so much against one that is cut."""
 
 _LEAVING = 16.0
-"""Programs draw where objects are, and edges tell of objects only in part: a cut through an object's place, half
-a side from where it was, counts for five, one a quarter of a side from there for two."""
+"""Programs draw where objects are, and edges tell of objects only in part: a cut through an object's place,
+half a side from where it was, counts for five, one a quarter of a side from there for two."""
 
 _GRAIN = 2.0
 """Differences of up to this many times the usual one are no edges."""

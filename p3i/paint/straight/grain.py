@@ -1,9 +1,9 @@
 """What one real cell has beside the mean of all: its own shade, and its grain.
 
-A mean of n cells keeps a share 1/n of the variance of what differs from cell to cell. Noise, the grain of wood
-and the pores of stone do: the mean is smooth where the surface is not. The fine part of one cell's difference
+A mean of n cells keeps a share 1/n of the variance of what differs from cell to cell, as noise, the grain of
+wood and the pores of stone do: it is smooth where the surface is not. The fine part of one cell's difference
 from the mean is all that is missing, at full strength. What is not like grain stays out: where a cell differs
-far more than it mostly does it shows something of its own, a stain or another face.
+far more than it does in quiet places it shows something of its own, a stain or another face.
 
 Convention: float32 [H, W, 3] in 0..1.
 """
@@ -19,15 +19,14 @@ _FINE = 0.04
 """Grain is finer than this share of a cell's shorter side (the deviation of the blur that it is told by)."""
 
 _QUIET, _USUAL = 25, 1.5
-"""Grain is as strong as a cell's differences are in the quietest quarter of its places (percent), up to so many
-times: what is more is an edge a little off its place, or a thing of its own."""
+"""Grain is as strong as a cell's differences are in quiet places (this percentile of all), up to so
+many times: what is more is an edge a little off its place, or a thing of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layers:
-    """A cell taken apart: the `mean` of all, its own `shade` and its `fine` differences, `grain` among them."""
+    """A cell less the mean of all: its `shade`, and its `fine` differences with the `grain` among them."""
 
-    mean: np.ndarray
     shade: np.ndarray
     fine: np.ndarray
     grain: np.ndarray
@@ -42,7 +41,7 @@ def layers(values: np.ndarray, seen: np.ndarray, mean: np.ndarray, *, cell: Size
     around = _blurred(np.abs(fine).mean(axis=2, keepdims=True), seen, sigma)
     usual = float(np.percentile(around[seen], _QUIET)) if seen.any() else 0.0
     share = np.minimum(1.0, _USUAL * usual / np.maximum(around, 1e-9)).astype(np.float32)
-    return Layers(mean, shade, fine, share * fine)
+    return Layers(shade, fine, share * fine)
 
 
 def _blurred(values: np.ndarray, seen: np.ndarray, sigma: float) -> np.ndarray:

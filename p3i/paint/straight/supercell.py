@@ -27,7 +27,7 @@ _MOST_DEG = 20.0
 """An assumed focal skews a plane that is seen aslant by up to this; farther off is another lattice."""
 
 _SKEW_DEG, _LEAN_DEG = 1.0, 10.0
-"""What is usual, with tails as of Cauchy's law: how far off a right angle is seen, how far photos are turned."""
+"""How far off a right angle is usual, and how far photos are turned; tails are long, as of Cauchy's law."""
 
 _FEWEST = 0.3
 """Fewer edges than this share of the usual number along the sides tell no more against them."""
@@ -58,10 +58,10 @@ class SuperCell:
 def supercell(basis: np.ndarray, runs: Callable[[float], float] | None = None) -> SuperCell:
     """The likeliest rectangle; where none is near to one, the nearest to it of up to four cells.
 
-    Likely is a right angle, as far as a lens may be mistaken, few cells, sides that stand upright, and
-    sides along which the pattern's edges run: `runs` says for a direction (degrees) how many do, against edges
-    that run all ways alike. Where rows are shifted by half, of bricks or along the fields of a chessboard, it
-    stands on them.
+    Likely is a right angle, as far as a lens may be mistaken, few cells, sides that stand upright, and sides
+    along which the pattern's edges run: `runs` says for a direction (degrees) how many do, 1 where they run
+    all ways alike. Where rows are shifted by half, of bricks or along the fields of a chessboard, it stands
+    on them.
 
     `basis` [2, 2] has rows u and v, not parallel.
     """

@@ -133,9 +133,7 @@ def tile(photo: Image, program: Program, options: TileOptions | None = None, **c
         pixels, known = wrapped(pixels, whole | shown.all(), size)
         used = (piece.index,)
         if (missing := 1 - float(whole[: size.height, : size.width].mean())) > 0.001:
-            notes.append(
-                f"{100 * missing:.1f} % of so many cells is not seen together: the mean is laid there"
-            )
+            notes.append(f"{100 * missing:.1f} % of these cells is not seen: what is usual is laid there")
     elif options.source == "best":
         pixels, known = wrapped(mean + own.shade, seen, cell, grain=own.fine)
         used = (stack.pieces[best].index,)
@@ -144,8 +142,8 @@ def tile(photo: Image, program: Program, options: TileOptions | None = None, **c
     found = patches.cell
     if found is not None and not found.rectangular:
         notes.append(
-            f"the pattern's cell is skewed by {found.shear_deg:.1f} degrees on the program's plane (its focal "
-            "may be assumed): the tile straightens it"
+            f"the cell is skewed by {found.shear_deg:.1f} degrees on the program's plane, perhaps since its "
+            "focal was assumed: the tile straightens it"
         )
     if not known.all():
         notes.append(f"{100 * (1 - known.mean()):.1f} % of the tile is seen in no cell, and transparent")
