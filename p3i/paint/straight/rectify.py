@@ -102,6 +102,7 @@ class Rectified:
             "u": None if turned is None else _plain(turned[0]),
             "v": None if turned is None else _plain(turned[1]),
             "mm_per_px": _plain(view.mm_per_px),
+            "px_per_mm": None if view.mm_per_px is None else _plain(1 / view.mm_per_px),
             "dpi": _plain(view.dpi),
         }
 

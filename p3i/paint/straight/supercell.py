@@ -11,14 +11,13 @@ from itertools import product
 
 import numpy as np
 
+from p3i.place.upright import reduced, row_of
+
 MOST = 4
 """Sides reach up to this many steps of u and of v."""
 
 MOST_CELLS = 8
 """A rectangle of more cells than this is no texture that anyone would want."""
-
-_HALF = 0.1
-"""Rows that are shifted by half to within this share of a half."""
 
 TOLERANCE_DEG = 3.0
 """Sides that are this near to a right angle count as rectangular, and nobody is told."""
@@ -81,17 +80,6 @@ def supercell(basis: np.ndarray, runs: Callable[[float], float] | None = None) -
     return min(found, key=lambda ranked: ranked[0])[1]
 
 
-def row_of(basis: np.ndarray) -> int | None:
-    """Which step of a basis [2, 2] is a row that the next is shifted against by half, as bricks are; or None.
-
-    Every step to the middle of the next row is one too, seen slantwise: the row is the straighter of the two.
-    """
-    leans = [abs(math.remainder(_angle_deg(step), 90.0)) for step in basis]
-    halves = np.abs(2 * np.abs(basis[0] @ basis[1]) / np.square(basis).sum(axis=1) - 1) < _HALF
-    k = int(leans[1] < leans[0])
-    return k if halves[k] and leans[k] < leans[1 - k] - 1 else None
-
-
 def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> SuperCell | None:
     """The super-cell of two sides (steps, vector); None where it is too large, or turns the wrong way."""
     (across, p), (down, q) = first, second
@@ -123,20 +111,6 @@ def _rank(cell: SuperCell, row: int | None, runs: Callable[[float], float] | Non
         order = (1.0, off * 2 ** (cell.cells - 1))
     longer = float(np.linalg.norm(cell.sides, axis=1).max())
     return (*(round(number, 6) for number in (*order, longer, lean, off)), *cell.steps.ravel().tolist())
-
-
-def reduced(basis: np.ndarray) -> np.ndarray:
-    """Steps [2, 2] of the two shortest vectors that span the lattice (Lagrange and Gauss)."""
-    steps = np.eye(2, dtype=int)
-    for _ in range(64):
-        u, v = steps @ basis
-        if u @ u > v @ v:
-            steps, (u, v) = steps[::-1].copy(), (v, u)
-        shift = round(float(u @ v / (u @ u)))
-        if shift == 0:
-            break
-        steps[1] -= shift * steps[0]
-    return steps
 
 
 def _angle_deg(vector: np.ndarray) -> float:
