@@ -176,6 +176,15 @@ def test_the_mean_keeps_the_grain_that_one_cell_has_everywhere() -> None:
     assert fine(near) == pytest.approx(fine(far), rel=0.2), "no less where the tile is blended into itself"
 
 
+def test_grain_is_as_strong_where_a_tile_is_blended_into_itself() -> None:
+    random = np.random.default_rng(3)
+    grain = random.normal(0, 0.05, (200, 200, 3)).astype(np.float32)
+    known = np.ones((200, 200), bool)
+    pixels, _ = wrapped(np.zeros_like(grain), known, Size(140, 140), grain=grain)
+    blended, plain = pixels[60:, 15:45].std(), pixels[60:, 60:].std()
+    assert blended == pytest.approx(plain, rel=0.05)
+
+
 def test_what_one_cell_has_of_its_own_is_no_grain() -> None:
     random = np.random.default_rng(2)
     mean = np.full((60, 60, 3), 0.5, np.float32)
@@ -201,6 +210,11 @@ def test_a_tile_of_many_cells_shows_neighbours_as_they_are() -> None:
     middles = found.pixels[20::40, 30::60]
     np.testing.assert_allclose(np.diff(middles[..., 0], axis=1), 0.05, atol=0.012)
     np.testing.assert_allclose(np.diff(middles[..., 1], axis=0), 0.05, atol=0.012)
+    ((column, row),) = found.used
+    expected = [0.5 + 0.05 * column, 0.5 + 0.05 * row]
+    np.testing.assert_allclose(
+        middles[0, 0, :2], expected, atol=0.012, err_msg="the first cell is the one told"
+    )
 
 
 def test_what_many_cells_do_not_show_is_as_usual_and_told() -> None:
