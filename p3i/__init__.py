@@ -40,11 +40,12 @@ if TYPE_CHECKING:
     from p3i.grammar.sketch import Sketch
     from p3i.interp.camera import Camera
     from p3i.language import check, dump, dumps, expand, format, load, load_sketch, loads
+    from p3i.options.cell import CellSize, parse_cell
     from p3i.options.edit import EditOptions
     from p3i.options.extend import ExtendOptions, Margins, parse_margins
     from p3i.options.inpaint import FindOptions, InpaintOptions
     from p3i.options.points import PointsOptions
-    from p3i.options.rectify import CellSize, RectifyOptions, parse_cell
+    from p3i.options.rectify import RectifyOptions
     from p3i.options.render import RenderOptions
     from p3i.options.show import ShowOptions
     from p3i.options.tile import TileOptions
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Camera": "p3i.interp.camera",
     "Candidate": "p3i.search.result",
-    "CellSize": "p3i.options.rectify",
+    "CellSize": "p3i.options.cell",
     "check": "p3i.language",
     "Diagnostic": "p3i.grammar.diagnostics",
     "dump": "p3i.language",
@@ -82,7 +83,7 @@ _HOMES = {
     "NoPatternError": "p3i.errors",
     "Other": "p3i.search.result",
     "P3IError": "p3i.errors",
-    "parse_cell": "p3i.options.rectify",
+    "parse_cell": "p3i.options.cell",
     "parse_margins": "p3i.options.extend",
     "ParseError": "p3i.grammar.parse_error",
     "points": "p3i.api",

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from p3i import files
-from p3i.api.search import Progress, photo_and_program, read_image, without
+from p3i.api.search import Progress, doubted, photo_and_program, read_image, without
 from p3i.carried import read_either, read_program
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
@@ -56,7 +56,10 @@ def render(
 
     if beside is None and isinstance(program, str | os.PathLike):
         beside = Path(program).parent
-    return draw(_in_memory(program), asked, image=image, sprite=sprite, beside=beside)
+    given = _in_memory(program)
+    if image is not None:
+        image = doubted(read_image(image) if isinstance(image, str | os.PathLike) else image, given, image)
+    return draw(given, asked, image=image, sprite=sprite, beside=beside)
 
 
 def show(
@@ -192,6 +195,7 @@ def inpaint(
         mask = read_mask(mask, image.size)  # once: it may come from standard input, and is needed twice
     seen = without(image, mask=mask, roi=None) if program is None else image
     _, found = photo_and_program(seen, program, config, progress=progress)
+    image = doubted(image, found, photo)
     return fill(image, found, asked, mask=mask, restore=restore, remove=remove, progress=progress)
 
 
@@ -215,7 +219,7 @@ def find_marred(
     from p3i.paint.fill.found import find_marred as look
 
     image, found = photo_and_program(photo, program, config, progress=progress)
-    return look(image, found, focal_mm=asked.focal_mm)
+    return look(doubted(image, found, photo), found, focal_mm=asked.focal_mm)
 
 
 def extend(

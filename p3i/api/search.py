@@ -174,11 +174,20 @@ def photo_and_program(
     given = program if isinstance(program, Program | None) else read_program(program)
     image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
     if given is not None:
-        return image, given
+        return doubted(image, given, photo), given
     result = synth(image, config, progress=progress)
     if result.program is None:
         raise NoPatternError(f"{result.reason}; give a program, or try `p3i synth -v` to see more")
     return image, result.program
+
+
+def doubted(image: "Image", program: Program, photo: "str | os.PathLike[str] | Image") -> "Image":
+    """`image`, which was read from `photo`, with a note where `program` was made for another one."""
+    from p3i.place.belongs import doubt
+
+    name = os.fspath(photo) if isinstance(photo, str | os.PathLike) else "-"
+    sentence = doubt(program, image.size, None if name == "-" else files.as_text(name))
+    return image if sentence is None else dataclasses.replace(image, notes=(sentence, *image.notes))
 
 
 @refuses_unknown

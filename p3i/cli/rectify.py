@@ -53,7 +53,10 @@ def command(**given: Any) -> int:
         camera, size = found.view.placed.camera, found.size
         view = f"{size.width} x {size.height} px, rx {camera.rx_deg:.4g}, ry {camera.ry_deg:.4g}"
         more = [f"{view}, focal {camera.focal_mm:.4g} mm"]
-        return batch.Answer(make=picture, facts=found.record, notes=found.notes, more=more)
+        info: list[str] = []
+        if found.view.mm_per_px is not None and found.view.dpi is not None:
+            info.append(f"{1 / found.view.mm_per_px:.4g} pixels per mm ({found.view.dpi:.4g} dpi)")
+        return batch.Answer(make=picture, facts=found.record, notes=found.notes, info=info, more=more)
 
     return each_photo(given, straighten, alone={"--back": edited}, read=(edited,))
 

@@ -68,6 +68,7 @@ def command(**given: Any) -> int:
         return batch.Answer(
             make=lambda: batch.Made(f"{text}\n".encode()),
             facts=lambda: facts,
+            notes=found.notes,
             more=[f"{found.objects} objects in sight"],
         )
 

@@ -8,10 +8,10 @@ import io
 from typing import Any
 
 from p3i.grammar.printer import format_program, number_text
-from p3i.place.objects import Objects, Polygon
+from p3i.place.objects import Object, Objects, Polygon
 
 COLUMNS = ("name", "row", "column", "i", "j", "x_px", "y_px", "x", "y", "presence", "inside", "cell_px")
-"""The head of the CSV."""
+"""The head of the CSV; with a cell's true size the place in its unit follows: x_mm, y_mm."""
 
 
 def table(found: Objects) -> str:
@@ -21,7 +21,8 @@ def table(found: Objects) -> str:
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    unit = None if found.cell_size is None else found.cell_size.unit
+    writer.writerow(COLUMNS if unit is None else (*COLUMNS, f"x_{unit}", f"y_{unit}"))
     for each in found.objects:
         presence = "" if each.presence is None else number_text(each.presence)
         writer.writerow(
@@ -35,13 +36,15 @@ def table(found: Objects) -> str:
                 presence,
                 str(each.inside).lower(),
                 _wkt(each.cell_px),
+                *map(number_text, each.true or ()),
             ]
         )
     return stream.getvalue()
 
 
 def record(found: Objects) -> dict[str, Any]:
-    """All that is known, as JSON has it."""
+    """All that is known, as JSON has it; with a cell's true size also lengths, and their unit."""
+    cell = found.cell_size
     return {
         "image": found.image,
         "width": found.size.width,
@@ -51,6 +54,7 @@ def record(found: Objects) -> dict[str, Any]:
         "rows": found.rows,
         "camera": {"rx": found.camera.rx_deg, "ry": found.camera.ry_deg, "focal": found.camera.focal_mm},
         "program": format_program(found.program),
+        **({} if cell is None else {"unit": cell.unit, "cell_size": list(cell.sides)}),
         "objects": [
             {
                 "name": each.name,
@@ -64,10 +68,18 @@ def record(found: Objects) -> dict[str, Any]:
                 "inside": each.inside,
                 "cell_px": [list(corner) for corner in each.cell_px],
                 "cell": [list(corner) for corner in each.cell],
+                **_true(each),
             }
             for each in found.objects
         ],
     }
+
+
+def _true(each: Object) -> dict[str, Any]:
+    """Place and cell in lengths, where they are known."""
+    if each.true is None:
+        return {}
+    return {"center_true": list(each.true), "cell_true": [list(corner) for corner in each.cell_true]}
 
 
 def _wkt(polygon: Polygon) -> str:

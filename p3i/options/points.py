@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 from p3i.errors import UsageError
+from p3i.options.cell import CellSize, parse_cell
 from p3i.records import PhotoFocal, Spelt, check_focal
 from p3i.size import Size, parse_size
 
@@ -36,6 +37,12 @@ class PointsOptions:
     ] = 0.0
     outside: Annotated[bool, "List the objects that lie outside the photo too.", Spelt("--all")] = False
     clip: Annotated[bool, "Cut the cells off at the photo's edge (COCO and YOLO always do)."] = False
+    cell: Annotated[
+        CellSize | None,
+        "The true size of one cell of a lattice, such as 600x600mm (mm, cm, m, in, ft): CSV, JSON and DXF "
+        "tell lengths in its unit, from the object (i, j) = (0, 0).",
+        Spelt(metavar="WxHmm", read=parse_cell),
+    ] = None
     label: Annotated[str, "The class of the objects in COCO, labelme and GeoJSON.", Spelt(metavar="WORD")] = (
         "object"
     )

@@ -4,45 +4,16 @@ Imports neither torch nor numpy: `p3i rectify --help` reads this file.
 """
 
 import math
-import re
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
+from p3i.options.cell import CellSize, parse_cell
 from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
 
 Crop = Literal["pattern", "inside", "all", "same"]
 CROPS: tuple[Crop, ...] = get_args(Crop)
 """What of the plane a straightened view shows."""
-
-_TO_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
-
-
-@dataclass(frozen=True, slots=True)
-class CellSize:
-    """The true width and height of one cell, in millimetres."""
-
-    width_mm: float
-    height_mm: float
-
-    def __post_init__(self) -> None:
-        if not all(math.isfinite(side) and 1e-6 < side < 1e9 for side in (self.width_mm, self.height_mm)):
-            raise UsageError(f"a cell has two sides above 0, not {self.width_mm:g} x {self.height_mm:g} mm")
-
-
-def parse_cell(text: str) -> CellSize:
-    """`600x600mm`, `60x30cm`, `1x1m`, `4x4in`, `2x1ft`; the unit may be left out for mm.
-
-    Raises UsageError for anything else.
-    """
-    number = r"(\d+(?:\.\d*)?|\.\d+)"
-    found = re.fullmatch(rf"\s*{number}\s*[xX×*]\s*{number}\s*([a-z]*)\s*", text)  # noqa: RUF001
-    if found is None or (found[3] or "mm") not in _TO_MM:
-        raise UsageError(
-            f"--cell {text}: write one cell's width and height, as in 600x600mm (mm, cm, m, in, ft)"
-        )
-    factor = _TO_MM[found[3] or "mm"]
-    return CellSize(float(found[1]) * factor, float(found[2]) * factor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +30,11 @@ class RectifyOptions:
         "Pixels of the view per pixel of the photo, where the photo is sharpest at the pattern's middle. "
         "[default: 1, or less where --max-px asks for it]",
         Spelt(metavar="S"),
+    ] = None
+    px_per_mm: Annotated[
+        float | None,
+        "With --cell: pixels of the view per millimetre of the plane, in the place of --scale.",
+        Spelt(metavar="N"),
     ] = None
     max_px: Annotated[int, "Make no view of more than N pixels (width times height).", Spelt(metavar="N")] = (
         36_000_000
@@ -87,6 +63,13 @@ class RectifyOptions:
             raise UsageError(f"a crop is one of {', '.join(CROPS)}, not {self.crop!r}")
         if self.scale is not None and not (math.isfinite(self.scale) and 0 < self.scale <= 100):
             raise UsageError(f"a scale lies above 0 and up to 100, not {self.scale:g}")
+        if self.px_per_mm is not None:
+            if self.cell is None:
+                raise UsageError("--px-per-mm needs --cell: what is one cell's true size?")
+            if self.scale is not None:
+                raise UsageError("--px-per-mm and --scale both say how large the view is: give one of them")
+            if not (math.isfinite(self.px_per_mm) and self.px_per_mm > 0):
+                raise UsageError(f"pixels per millimetre are above 0, not {self.px_per_mm:g}")
         check_max_px(self.max_px)
         if self.tolerance is not None and not 0 <= self.tolerance < 255:
             raise UsageError(f"a tolerance lies from 0 to below 255, not {self.tolerance:g}")

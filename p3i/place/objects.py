@@ -4,6 +4,7 @@ Convention: pixels of the photo, pixel centres at whole numbers, x right, y down
 The formats in p3i/export have their own pixels and say so.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.interp.camera import Camera
+from p3i.options.cell import MM_PER, CellSize
 from p3i.options.points import PointsOptions
 from p3i.place import outlines
 from p3i.place.clip import clipped_to_canvas, cut_before_camera, without_straight_corners
@@ -20,6 +22,7 @@ from p3i.place.lens import bent_points
 from p3i.place.naming import Arrangement, Naming, named
 from p3i.place.placed import Placed, placed
 from p3i.place.presence import THERE, presence_of
+from p3i.place.upright import upright_from_plane
 from p3i.records import changed
 from p3i.size import Size
 from p3i.vision.image import Image
@@ -35,7 +38,9 @@ class Object:
     of its cell on both (`cell_px` is empty where all of the cell lies outside the photo and is cut off, or
     behind the camera). `presence`, 0 to 1, says whether the photo shows it: at least 0.5 is yes; None without
     a photo, or where it lies outside or too little of it is known. `outward` is the direction on the plane
-    from the middle of its ring, of length 1; None where there is no ring.
+    from the middle of its ring, of length 1; None where there is no ring. `true` and `cell_true`
+    are place and cell in lengths, in the unit of the cell's true size, where that was given: upright, x to
+    the right, y down, from the place of the object (i, j) = (0, 0).
     """
 
     name: str
@@ -52,6 +57,8 @@ class Object:
     cell_px: Polygon
     cell: Polygon
     outward: tuple[float, float] | None = None
+    true: tuple[float, float] | None = None
+    cell_true: Polygon = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +67,8 @@ class Objects:
 
     `outside` and `faint` count the objects that were left out: beyond the photo, and less present than asked;
     `behind` those that lie behind the camera, which have no place on the photo, `placed.far`
-    those too far away. `notes` are sentences for the user.
+    those too far away. `cell_size` is the true size of a cell, where it was given. `notes` are sentences
+    for the user.
     """
 
     objects: tuple[Object, ...]
@@ -76,6 +84,7 @@ class Objects:
     behind: int
     placed: Placed = field(repr=False)
     photo: Image | None = field(repr=False)
+    cell_size: CellSize | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -135,6 +144,7 @@ def objects_of(
     options = changed(options or PointsOptions(), changes, verb="points")
     canvas = photo if photo is not None else _blank(program, options)
     laid = placed(program, canvas, focal_mm=options.focal_mm)
+    lengths = _lengths(laid, options.cell)
     naming = named(laid)
     centers_px, front = laid.shown_px()
     inside = laid.in_sight()
@@ -168,6 +178,8 @@ def objects_of(
                 cell_px=_rounded(cell_px, 3),
                 cell=_rounded(cell, 6),
                 outward=_outward(naming, place),
+                true=None if lengths is None else lengths(laid.points[place][None])[0],
+                cell_true=() if lengths is None else lengths(cell),
             )
         )
     return Objects(
@@ -184,6 +196,7 @@ def objects_of(
         behind=int((~front).sum()),
         placed=laid,
         photo=photo,
+        cell_size=options.cell,
         notes=photo.notes if photo is not None else (),
     )
 
@@ -202,6 +215,14 @@ def cell_on_photo(laid: Placed, cell: np.ndarray) -> np.ndarray:
     fine = (pixels[:, None] + parts * (np.roll(pixels, -1, axis=0) - pixels)[:, None]).reshape(-1, 2)
     bent, shown = bent_points(fine, laid.size, laid.lens_k1)
     return bent[shown]
+
+
+def _lengths(laid: Placed, cell: CellSize | None) -> Callable[[np.ndarray], Polygon] | None:
+    """The map from plane points [K, 2] to true lengths; None where no true size is known."""
+    if cell is None:
+        return None
+    linear = upright_from_plane(laid, upright=True, cell=cell) / MM_PER[cell.unit]
+    return lambda points: _rounded((points - laid.origin) @ linear.T, cell.digits)
 
 
 def _outward(naming: Naming, place: int) -> tuple[float, float] | None:

@@ -27,6 +27,7 @@ class Evaluation:
     edges: int
     agreement: float
     objects: int = 9
+    notes: tuple[str, ...] = ()
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ import pytest
 import p3i
 from p3i.carried import read_program
 from p3i.errors import UsageError
+from p3i.options.cell import CellSize, parse_cell
 from p3i.options.points import FORMATS
 from p3i.place.clip import area
 from p3i.place.objects import Objects
@@ -243,3 +244,56 @@ def test_dxf_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatc
 def test_an_unknown_format_is_refused_by_name() -> None:
     with pytest.raises(UsageError, match="not 'xls'"):
         board().encode("xls")
+
+
+METRIC = """SetCameraPose(rx=-35, ry=12)
+for i in range(-1, 3):
+    for j in range(0, 3):
+        Draw(x=11*i - 1.5*j - 8, y=2*i + 9*j - 12)
+"""
+
+
+def test_a_cell_of_true_size_makes_lengths_of_places() -> None:
+    found = p3i.points(p3i.loads(HEAD + METRIC), cell=parse_cell("600x400mm"))
+    for each in found.objects:
+        assert each.true == pytest.approx((600 * each.i, 400 * each.j), abs=0.01)
+        corners = np.array(each.cell_true) - each.true
+        assert sorted(map(tuple, np.round(corners).tolist())) == [
+            (-300, -200),
+            (-300, 200),
+            (300, -200),
+            (300, 200),
+        ]
+    record = json.loads(found.encode("json"))
+    assert (record["unit"], record["cell_size"]) == ("mm", [600, 400])
+    assert [tuple(each["center_true"]) for each in record["objects"]] == [each.true for each in found.objects]
+    rows = list(csv.DictReader(io.StringIO(found.encode("csv").decode())))
+    assert [(float(row["x_mm"]), float(row["y_mm"])) for row in rows] == [each.true for each in found.objects]
+    plain = p3i.points(p3i.loads(HEAD + METRIC))
+    assert "unit" not in plain.record() and "x_mm" not in plain.encode("csv").decode()
+
+
+@pytest.mark.parametrize(
+    ("cell", "code", "step"), [("600x400mm", 4, 600), ("60x40cm", 5, 60), ("2x1ft", 2, 2), ("4x4in", 1, 4)]
+)
+def test_dxf_tells_lengths_in_the_unit_of_the_cell(cell: str, code: int, step: float, tmp_path: Path) -> None:
+    import ezdxf
+
+    found = p3i.points(p3i.loads(HEAD + METRIC), cell=parse_cell(cell))
+    found.save(tmp_path / "a.dxf")
+    drawing = ezdxf.readfile(tmp_path / "a.dxf")
+    assert drawing.header["$INSUNITS"] == code
+    places = np.array([point.dxf.location for point in drawing.modelspace().query("POINT")])[:, :2]
+    expected = [(each.true[0], -each.true[1]) for each in found.objects if each.true]
+    np.testing.assert_allclose(places, expected, atol=1e-6)
+    across = [each.true[0] for each in found.objects if each.true and each.i == 1]
+    np.testing.assert_allclose(across, step, rtol=1e-4)
+    outlines = [list(line.get_points("xy")) for line in drawing.modelspace().query("LWPOLYLINE")]
+    np.testing.assert_allclose(np.mean(outlines, axis=1), places, atol=1e-3 * step)
+
+
+def test_true_sizes_need_a_lattice_and_a_unit() -> None:
+    with pytest.raises(UsageError, match="lattice"):
+        p3i.points(p3i.loads(HEAD + RINGS), cell=CellSize(10, 10))
+    with pytest.raises(UsageError, match="told in"):
+        CellSize(10, 10, "furlong")

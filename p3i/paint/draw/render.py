@@ -167,7 +167,7 @@ def render(
         focal_source,
         centers_px,
         objects.index,
-        _notes(program, photo, depth, options, too_far=objects.too_far),
+        _notes(photo, depth, too_far=objects.too_far),
     )
 
 
@@ -277,18 +277,8 @@ def _sprite(
         raise FileError(f"the picture of Draw(...): {error}") from None
 
 
-def _notes(
-    program: Program, photo: Image | None, depth: np.ndarray, options: RenderOptions, *, too_far: int
-) -> tuple[str, ...]:
+def _notes(photo: Image | None, depth: np.ndarray, *, too_far: int) -> tuple[str, ...]:
     notes: list[str] = list(photo.notes) if photo is not None else []
-    canvas = program.header.canvas if program.header else None
-    if photo is not None and canvas is not None and not options.plane:
-        shapes = [photo.size.width / photo.size.height, canvas[0] / canvas[1]]
-        if abs(shapes[0] - shapes[1]) > 0.01 * max(shapes):
-            notes.append(
-                f"the program was made for a canvas of {canvas[0]} x {canvas[1]}, whose shape is not that of "
-                f"this photo of {photo.size.width} x {photo.size.height}"
-            )
     if too_far:
         notes.append(f"{too_far} objects lie more than {FAR:,.0f} units away and are not drawn")
     elif not len(depth):

@@ -14,10 +14,11 @@ import torch
 from p3i.errors import ProgramError
 from p3i.interp.lens import straight_from_photo
 from p3i.options.rectify import RectifyOptions
-from p3i.paint.straight.straightened import Straightened, upright_from_plane
+from p3i.paint.straight.straightened import Straightened
 from p3i.place import outlines
 from p3i.place.clip import cut_polygon
 from p3i.place.placed import Placed
+from p3i.place.upright import upright_from_plane
 from p3i.size import Size, refuse_huge
 from p3i.vision.rectangle import largest_rectangle
 
@@ -42,7 +43,8 @@ def straightened(
     linear = upright_from_plane(placed, upright=options.upright, cell=options.cell)
     middle = _middle(placed)
     finest = _finest(placed, linear, middle)
-    scale = 1.0 if options.scale is None else options.scale
+    asked = options.scale if options.px_per_mm is None else options.px_per_mm / finest
+    scale = 1.0 if asked is None else asked
     ground, cut = _ground(placed, linear, middle, farthest=_FARTHEST, k1=k1)
     notes: list[str] = []
     match options.crop:
@@ -63,11 +65,11 @@ def straightened(
         case _:
             rectangle = _pattern(placed, linear, middle, k1=k1)
     fit = math.sqrt(options.max_px / max(1.0, float(np.prod((rectangle[1] - rectangle[0]) * finest))))
-    if options.scale is None and fit < 1:
+    if asked is None and fit < 1:
         scale = fit * 0.999
         notes.append(f"scaled by {scale:.3g} to make no more than {options.max_px:,} pixels (--max-px)")
     result = _canvas(placed, linear, rectangle, scale=scale, finest=finest, k1=k1, options=options)
-    while options.scale is None and (pixels := result.size.width * result.size.height) > options.max_px:
+    while asked is None and (pixels := result.size.width * result.size.height) > options.max_px:
         # Sides are whole numbers of pixels, at least one: rounding took it over the limit.
         scale *= min(0.999, math.sqrt(options.max_px / pixels))
         result = _canvas(placed, linear, rectangle, scale=scale, finest=finest, k1=k1, options=options)

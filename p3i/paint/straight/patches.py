@@ -49,9 +49,34 @@ class Patches:
     cell: SuperCell | None
     drawn: Callable[[Patch, np.ndarray, np.ndarray], np.ndarray]
 
+    def reframed(self, count: tuple[int, int], middle: tuple[float, float]) -> "Patches":
+        """The same pieces, each `count` times as wide and as high, `middle` from its middle, in its sides."""
 
-def patches_of(placed: Placed) -> Patches:
-    """The pieces of a program's objects that lie on the photo.
+        def within(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return count[0] * x + middle[0], count[1] * y + middle[1]
+
+        scale = np.array([[count[0], 0, middle[0]], [0, count[1], middle[1]], [0, 0, 1.0]])
+
+        def moved(piece: Patch) -> Patch:
+            flat = piece.plane_from_patch
+            return Patch(
+                piece.index,
+                piece.center,
+                lambda x, y: piece.plane(*within(x, y)),
+                None if flat is None else flat @ scale,
+            )
+
+        return Patches(
+            self.placed,
+            tuple(moved(piece) for piece in self.pieces),
+            self.extent * count,
+            self.cell,
+            lambda piece, x, y: self.drawn(piece, *within(x, y)),
+        )
+
+
+def patches_of(placed: Placed, runs: Callable[[float], float] | None = None) -> Patches:
+    """The pieces of a program's objects that lie on the photo; `runs` as for `supercell`.
 
     Raises ProgramError for a program that is neither a lattice nor rings, or that has no object on the photo.
     """
@@ -61,7 +86,7 @@ def patches_of(placed: Placed) -> Patches:
             "none of the program's objects lie on the photo: is it the program of another photo?"
         )
     if placed.basis is not None:
-        return _lattice(placed, placed.basis, seen)
+        return _lattice(placed, placed.basis, seen, runs)
     return _rings(placed, seen)
 
 
@@ -103,8 +128,10 @@ def finest(placed: Placed, points: np.ndarray) -> float:
     return float(np.linalg.norm(jacobians, ord=2, axis=(1, 2)).max())
 
 
-def _lattice(placed: Placed, basis: np.ndarray, seen: np.ndarray) -> Patches:
-    cell = supercell(basis)
+def _lattice(
+    placed: Placed, basis: np.ndarray, seen: np.ndarray, runs: Callable[[float], float] | None
+) -> Patches:
+    cell = supercell(basis, runs)
     low, high = placed.index.min(axis=0), placed.index.max(axis=0)
     table = np.zeros(high - low + 3, bool)
     table[tuple((placed.index - low + 1).T)] = True

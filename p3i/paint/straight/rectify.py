@@ -102,6 +102,7 @@ class Rectified:
             "u": None if turned is None else _plain(turned[0]),
             "v": None if turned is None else _plain(turned[1]),
             "mm_per_px": _plain(view.mm_per_px),
+            "px_per_mm": None if view.mm_per_px is None else _plain(1 / view.mm_per_px),
             "dpi": _plain(view.dpi),
         }
 
@@ -133,16 +134,7 @@ def rectify(
     laid = placed(program, photo, focal_mm=options.focal_mm)
     k1 = (program.header.lens_k1 if program.header else None) or None
     view, notes = straightened(laid, photo.valid, options, k1=k1)
-    canvas = program.header.canvas if program.header else None
-    heard = list(photo.notes)
-    if canvas is not None and abs(canvas[0] * photo.size.height - canvas[1] * photo.size.width) > 0.01 * (
-        canvas[1] * photo.size.width
-    ):
-        heard.append(
-            f"the program was made for a canvas of {canvas[0]} x {canvas[1]}, whose shape is not that of "
-            f"this photo of {photo.size.width} x {photo.size.height}"
-        )
-    return Rectified(photo, program, view, options, (*heard, *notes))
+    return Rectified(photo, program, view, options, (*photo.notes, *notes))
 
 
 def _scaled(matrix: np.ndarray) -> np.ndarray:

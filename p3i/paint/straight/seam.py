@@ -7,6 +7,12 @@ import numpy as np
 
 from p3i.size import Size
 
+_FAINT, _PLAIN = 1.25, 2.0
+"""A seam is faint, or plain, where neighbours differ by more than so many times as much as elsewhere."""
+
+_LEVEL = 1.0
+"""What differs by no more than one of 255 levels nobody sees."""
+
 
 @dataclass(frozen=True, slots=True)
 class Seam:
@@ -25,12 +31,17 @@ class Seam:
     beside_y: float | None
 
     @property
+    def ratios(self) -> tuple[float, float | None]:
+        """The differences across the wrap against the larger of those inside and beside it, x and y."""
+        x = self.across_x / max(self.inside_x, self.beside_x, 0.25)
+        if self.across_y is None or self.inside_y is None or self.beside_y is None:
+            return x, None
+        return x, self.across_y / max(self.inside_y, self.beside_y, 0.25)
+
+    @property
     def ratio(self) -> float:
-        """The worse of the two directions, against the differences inside or beside it; 1 is no seam."""
-        found = [self.across_x / max(self.inside_x, self.beside_x, 0.25)]
-        if self.across_y is not None and self.inside_y is not None and self.beside_y is not None:
-            found.append(self.across_y / max(self.inside_y, self.beside_y, 0.25))
-        return max(found)
+        """The worse of the two directions; 1 is no seam."""
+        return max(ratio for ratio in self.ratios if ratio is not None)
 
     def record(self) -> dict[str, Any]:
         """As plain JSON values."""
@@ -39,11 +50,20 @@ class Seam:
         return {name: None if value is None else round(value, 3) for name, value in values.items()}
 
     def sentence(self) -> str:
-        """For people."""
-        found = f"seam {self.across_x:.2f} across the wrap against {self.inside_x:.2f} inside, left to right"
-        if self.across_y is not None:
-            found += f"; {self.across_y:.2f} against {self.inside_y:.2f}, top to bottom"
-        return f"{found} (mean difference of neighbours, of 255)"
+        """For people: whether a seam shows where the tile meets itself, and how strongly."""
+        sides = zip(
+            ("left to right", "top to bottom"), self.ratios, (self.across_x, self.across_y), strict=True
+        )
+        said = [
+            f"{'a seam shows' if ratio > _PLAIN else 'a faint seam'} {way}, where neighbouring pixels differ "
+            f"{ratio:.1f} times as much as elsewhere in the tile"
+            for way, ratio, across in sides
+            if ratio is not None and across is not None and ratio > _FAINT and across > _LEVEL
+        ]
+        if said:
+            return "; ".join(said)
+        ways = "left to right" if self.across_y is None else "left to right and top to bottom"
+        return f"it wraps {ways} without a visible seam"
 
 
 def seam_of(pixels: np.ndarray, known: np.ndarray, *, down: bool) -> Seam:
@@ -54,25 +74,34 @@ def seam_of(pixels: np.ndarray, known: np.ndarray, *, down: bool) -> Seam:
     return Seam(*x, *_differences(pixels.transpose(1, 0, 2), known.T))
 
 
-def wrapped(pixels: np.ndarray, known: np.ndarray, size: Size) -> tuple[np.ndarray, np.ndarray]:
+def wrapped(
+    pixels: np.ndarray, known: np.ndarray, size: Size, *, grain: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """A tile [H, W, 3] of `size`, and what of it is known, from a larger piece.
 
     `pixels` [H + a, W + b, 3] and `known` hold a rows and b columns more, none perhaps: what lies beyond the
-    far sides is blended into the near sides, which it continues.
+    right and lower sides is blended into the near sides, which it continues. So is `grain`, which is added:
+    where two grains meet, which have nothing to do with each other, the blend is as strong as either.
     """
     found, seen = _folded(pixels, known, size.width)
     found, seen = _folded(found.transpose(1, 0, 2), seen.T, size.height)
+    if grain is not None:
+        own, own_seen = _folded(grain, known, size.width, strong=True)
+        found = found + _folded(own.transpose(1, 0, 2), own_seen.T, size.height, strong=True)[0]
     return np.ascontiguousarray(found.transpose(1, 0, 2)), np.ascontiguousarray(seen.T)
 
 
-def _folded(pixels: np.ndarray, known: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """The first `width` columns, with those beyond blended over the first."""
+def _folded(
+    pixels: np.ndarray, known: np.ndarray, width: int, *, strong: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """The first `width` columns, with those beyond blended over the first; `strong` keeps their variance."""
     extra = pixels.shape[1] - width
     found, seen = pixels[:, :width].copy(), known[:, :width].copy()
     if extra:
         own, other = seen[:, :extra], known[:, width:]
         share = np.where(own & other, _ramp(extra)[None, :], own.astype(np.float32))[:, :, None]
-        found[:, :extra] = share * found[:, :extra] + (1 - share) * pixels[:, width:]
+        lost = np.sqrt(share**2 + (1 - share) ** 2) if strong else np.float32(1)
+        found[:, :extra] = (share * found[:, :extra] + (1 - share) * pixels[:, width:]) / lost
         seen[:, :extra] = own | other
     return found, seen
 

@@ -5,10 +5,13 @@ the first running most nearly to the right (x), the second down (y).
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+
+from p3i.place.upright import reduced, row_of
 
 MOST = 4
 """Sides reach up to this many steps of u and of v."""
@@ -16,11 +19,20 @@ MOST = 4
 MOST_CELLS = 8
 """A rectangle of more cells than this is no texture that anyone would want."""
 
-_HALF = 0.1
-"""Rows that are shifted by half to within this share of a half."""
-
 TOLERANCE_DEG = 3.0
-"""Sides that are this near to a right angle count as rectangular: an assumed focal skews by as much."""
+"""Sides that are this near to a right angle count as rectangular, and nobody is told."""
+
+_MOST_DEG = 20.0
+"""An assumed focal skews a plane that is seen aslant by up to this; farther off is another lattice."""
+
+_SKEW_DEG, _LEAN_DEG = 1.0, 10.0
+"""How far off a right angle is usual, and how far photos are turned; tails are long, as of Cauchy's law."""
+
+_FEWEST = 0.3
+"""Fewer edges than this share of the usual number along the sides tell no more against them."""
+
+_CELL_NATS = 2.5
+"""What each further cell must be worth: a large rectangle comes near to a right angle by chance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,10 +54,13 @@ class SuperCell:
         return abs(self.shear_deg) <= TOLERANCE_DEG
 
 
-def supercell(basis: np.ndarray) -> SuperCell:
-    """The rectangle of fewest cells; where none is rectangular, the nearest to it of up to four cells.
+def supercell(basis: np.ndarray, runs: Callable[[float], float] | None = None) -> SuperCell:
+    """The likeliest rectangle; where none is near to one, the nearest to it of up to four cells.
 
-    Where rows are shifted by half, of bricks or along the fields of a chessboard, it stands on them.
+    Likely is a right angle, as far as a lens may be mistaken, few cells, sides that stand upright, and sides
+    along which the pattern's edges run: `runs` says for a direction (degrees) how many do, 1 where they run
+    all ways alike. Where rows are shifted by half, of bricks or along the fields of a chessboard, it stands
+    on them.
 
     `basis` [2, 2] has rows u and v, not parallel.
     """
@@ -55,7 +70,7 @@ def supercell(basis: np.ndarray) -> SuperCell:
     for widest_deg in (45.0, 90.0):
         rights = [(pair, p) for pair, p in vectors if abs(_angle_deg(p)) <= widest_deg + 1e-9]
         found = [
-            (_rank(cell, row), cell)
+            (_rank(cell, row, runs), cell)
             for first in rights
             for second in vectors
             if (cell := _cell(first, second)) is not None
@@ -63,17 +78,6 @@ def supercell(basis: np.ndarray) -> SuperCell:
         if found:
             break
     return min(found, key=lambda ranked: ranked[0])[1]
-
-
-def row_of(basis: np.ndarray) -> int | None:
-    """Which step of a basis [2, 2] is a row that the next is shifted against by half, as bricks are; or None.
-
-    Every step to the middle of the next row is one too, seen slantwise: the row is the straighter of the two.
-    """
-    leans = [abs(math.remainder(_angle_deg(step), 90.0)) for step in basis]
-    halves = np.abs(2 * np.abs(basis[0] @ basis[1]) / np.square(basis).sum(axis=1) - 1) < _HALF
-    k = int(leans[1] < leans[0])
-    return k if halves[k] and leans[k] < leans[1 - k] - 1 else None
 
 
 def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> SuperCell | None:
@@ -84,12 +88,12 @@ def _cell(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.nda
     if not 1 <= cells <= MOST_CELLS or turn <= 0:
         return None
     shear_deg = 90.0 - math.degrees(math.atan2(turn, float(p @ q)))
-    if abs(shear_deg) > TOLERANCE_DEG and cells > 4:
+    if abs(shear_deg) > _MOST_DEG and cells > 4:
         return None
     return SuperCell(np.array([across, down]), np.array([p, q]), cells, shear_deg)
 
 
-def _rank(cell: SuperCell, row: int | None) -> tuple[float, ...]:
+def _rank(cell: SuperCell, row: int | None, runs: Callable[[float], float] | None) -> tuple[float, ...]:
     """Less is better; no two super-cells of a lattice rank alike.
 
     In a honeycomb three rectangles are as large as each other, turned by 60 degrees, and which is the most
@@ -97,24 +101,16 @@ def _rank(cell: SuperCell, row: int | None) -> tuple[float, ...]:
     """
     off, lean = abs(cell.shear_deg), abs(_angle_deg(cell.sides[0]))
     astray = 0.0 if row is None or (np.abs(cell.steps) == np.eye(2)[row]).all(axis=1).any() else 1.0
-    # Of those that are skewed, a cell more must halve the angle.
-    order = (0.0, astray, cell.cells, lean) if cell.rectangular else (1.0, off * 2 ** (cell.cells - 1))
+    if off <= _MOST_DEG:
+        nats = _CELL_NATS * (cell.cells - 1) + math.log1p((off / _SKEW_DEG) ** 2)
+        nats += math.log1p((lean / _LEAN_DEG) ** 2)
+        if runs is not None:
+            nats -= math.log(max(_FEWEST, sum(runs(_angle_deg(side)) for side in cell.sides) / 2))
+        order = (0.0, astray, nats)
+    else:  # a cell more must halve the angle
+        order = (1.0, off * 2 ** (cell.cells - 1))
     longer = float(np.linalg.norm(cell.sides, axis=1).max())
     return (*(round(number, 6) for number in (*order, longer, lean, off)), *cell.steps.ravel().tolist())
-
-
-def reduced(basis: np.ndarray) -> np.ndarray:
-    """Steps [2, 2] of the two shortest vectors that span the lattice (Lagrange and Gauss)."""
-    steps = np.eye(2, dtype=int)
-    for _ in range(64):
-        u, v = steps @ basis
-        if u @ u > v @ v:
-            steps, (u, v) = steps[::-1].copy(), (v, u)
-        shift = round(float(u @ v / (u @ u)))
-        if shift == 0:
-            break
-        steps[1] -= shift * steps[0]
-    return steps
 
 
 def _angle_deg(vector: np.ndarray) -> float:

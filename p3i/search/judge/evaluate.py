@@ -36,13 +36,14 @@ class Evaluation:
     squared difference of their features. `agreement`: the mean over the objects in sight of how much better
     the others predict them than half a step away, less what few objects get by chance; 0 says nothing, 1 is
     perfect. `synth` has the same for its answers, from the finished program. `objects`: how many are in
-    sight.
+    sight. `notes`: what a user should know of the photo, and of the program on it.
     """
 
     equation2: float
     edges: int
     agreement: float
     objects: int
+    notes: tuple[str, ...] = ()
 
 
 def evaluate(image: Image, program: Program, config: SearchConfig) -> Evaluation:
@@ -72,7 +73,7 @@ def _evaluated(image: Image, program: Program, config: SearchConfig) -> Evaluati
     if int(seen.sum()) < 2:
         raise ProgramError(f"{int(seen.sum())} of the program's objects lie in the photo; a score needs two")
     loss, pairs = _equation2(evidence, pattern, points, seen)
-    return Evaluation(loss, pairs, normalised_score(evidence, pattern), int(seen.sum()))
+    return Evaluation(loss, pairs, normalised_score(evidence, pattern), int(seen.sum()), image.notes)
 
 
 def _in_window(image: Image, program: Program) -> Image:

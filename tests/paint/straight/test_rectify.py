@@ -8,7 +8,8 @@ import pytest
 
 from p3i import loads
 from p3i.errors import ProgramError, UsageError
-from p3i.options.rectify import CROPS, CellSize, parse_cell
+from p3i.options.cell import CellSize, parse_cell
+from p3i.options.rectify import CROPS
 from p3i.paint.straight.rectify import Rectified, rectify
 from p3i.size import Size
 from p3i.vision.decode import Source
@@ -199,6 +200,30 @@ def test_a_known_cell_makes_the_view_metric_whatever_the_focal() -> None:
         assert u @ v == pytest.approx(0, abs=1e-3)
         assert record["dpi"] == pytest.approx(25.4 / record["mm_per_px"])
         assert np.linalg.det(found.view.view_from_plane[:2, :2]) > 0
+
+
+def test_pixels_per_millimetre_are_told_and_can_be_asked_for() -> None:
+    told = rectify(blank(), loads(LATTICE), cell=CellSize(600, 300)).record()
+    assert told["px_per_mm"] * told["mm_per_px"] == pytest.approx(1)
+    asked = rectify(blank(), loads(LATTICE), cell=CellSize(600, 300), px_per_mm=0.25)
+    record = asked.record()
+    assert record["px_per_mm"] == pytest.approx(0.25) and record["dpi"] == pytest.approx(0.25 * 25.4)
+    assert np.linalg.norm(record["u"]) == pytest.approx(150)
+    assert rectify(blank(), loads(LATTICE)).record()["px_per_mm"] is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"px_per_mm": 2.0}, "needs --cell"),
+        ({"px_per_mm": 2.0, "scale": 1.0, "cell": CellSize(600, 300)}, "one of them"),
+        ({"px_per_mm": -1.0, "cell": CellSize(600, 300)}, "above 0"),
+        ({"px_per_mm": 1e4, "cell": CellSize(600, 300)}, "max-px"),
+    ],
+)
+def test_pixels_per_millimetre_that_cannot_be_are_refused(changes: dict, reason: str) -> None:
+    with pytest.raises(UsageError, match=reason):
+        rectify(blank(), loads(LATTICE), **changes)
 
 
 ROWS = """SetCameraPose(rx=-30, ry=4)

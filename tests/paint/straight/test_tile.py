@@ -1,15 +1,20 @@
 """Tiles: the smallest rectangle that repeats, how it wraps, and the light that is taken out of it."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
 
 from p3i import loads
 from p3i.errors import ProgramError, UsageError
+from p3i.paint.straight.aligned import robust_mean
+from p3i.paint.straight.cut import cut_of
+from p3i.paint.straight.grain import layers
 from p3i.paint.straight.light import fitted_light
-from p3i.paint.straight.seam import seam_of, wrapped
+from p3i.paint.straight.seam import Seam, seam_of, wrapped
 from p3i.paint.straight.supercell import supercell
-from p3i.paint.straight.tile import robust_mean, tile
+from p3i.paint.straight.tile import tile
 from p3i.place.placed import placed
 from p3i.size import Size
 from p3i.vision.image import Image
@@ -87,9 +92,158 @@ def test_the_tile_of_a_chessboard_stands_on_the_rows_that_its_program_has() -> N
     columns = supercell(np.array([[5.0, -5.0], [0.1, 10.0]]))
     assert columns.steps.tolist() == [[2, 1], [0, 1]] and columns.cells == 2
     diagonals = supercell(np.array([[5.0, -5.0], [5.0, 5.0]]))
-    assert diagonals.cells == 1
+    assert diagonals.cells == 2 and diagonals.sides.tolist() == [[10, 0], [0, 10]], "upright, not a diamond"
     sheared = supercell(np.array([[5.0, 0.0], [5.0, 5.0]]))
     assert sheared.cells == 1
+
+
+@pytest.mark.parametrize(
+    "basis",
+    [
+        [[8.38, 2.47], [-2.75, 7.56]],  # 3.6 degrees off; five cells happen to be off by 1.6
+        [[9.0, 1.6], [-0.75, 8.5]],
+        [[6.0, -1.6], [2.9, 7.6]],  # 6.1 degrees off; three cells by 1.1
+    ],
+)
+def test_a_cell_that_a_mistaken_focal_skews_is_preferred_to_many_that_chance_makes_square(
+    basis: list,
+) -> None:
+    found = supercell(np.array(basis))
+    assert found.cells == 1 and abs(found.shear_deg) < 10
+
+
+def test_of_two_rectangles_the_one_is_taken_along_which_the_edges_run() -> None:
+    basis = np.array([[9.1, 4.6], [-5.5, 6.9]])  # 11.8 degrees off along its sides, 16 across its diagonals
+    along = supercell(basis, lambda deg: 6.0 if min(abs(deg - 27), abs(deg - 128.5)) < 4 else 0.4)
+    across = supercell(basis, lambda deg: 0.4 if min(abs(deg - 27), abs(deg - 128.5)) < 4 else 6.0)
+    assert along.cells == 1 and across.cells == 2
+
+
+def framed(points: np.ndarray) -> np.ndarray:
+    """Light panes in dark frames, 9 wide and 5 high; their middles lie at (2, 1) from the objects'."""
+    a, b = (points[..., 0] - 2) / 9, (points[..., 1] - 1) / 5
+    pane = (np.abs(a - np.round(a)) < 0.35) & (np.abs(b - np.round(b)) < 0.3)
+    return np.where(pane, 0.8, 0.2)[..., None].repeat(3, -1)
+
+
+UPRIGHT = SKEWED.replace("9*i + 4.5*j", "9*i")
+
+
+@pytest.mark.parametrize("source", ["mean", "best"])
+def test_a_tile_is_cut_between_objects_so_that_they_are_whole(source: str) -> None:
+    found = tile(painted(UPRIGHT, framed), loads(UPRIGHT), source=source)
+    assert found.cut == pytest.approx((2 / 9, 1 / 5), abs=0.08)
+    rim = np.concatenate([found.pixels[0], found.pixels[-1], found.pixels[:, 0], found.pixels[:, -1]])
+    assert rim.max() < 0.35, "no pane touches the tile's side"
+
+
+def test_a_chessboard_is_cut_along_its_fields() -> None:
+    y, x = np.mgrid[0:96, 0:96] + 0.5
+    fields = (np.floor(x / 48 + 0.5) + np.floor(y / 48 + 0.5)) % 2
+    random = np.random.default_rng(0)
+    board = np.repeat(fields[:, :, None], 3, axis=2) + random.normal(0, 0.01, (96, 96, 3))
+    moved = cut_of(cv2.GaussianBlur(board, (0, 0), 1.0, borderType=cv2.BORDER_REFLECT), down=True)
+    assert np.abs(moved) == pytest.approx(np.array([0.25, 0.25]), abs=0.02)
+
+
+def test_a_smooth_tile_is_not_moved() -> None:
+    y, x = np.mgrid[0:60, 0:90]
+    waves = 0.5 + 0.2 * np.cos(2 * np.pi * x / 90) + 0.2 * np.cos(2 * np.pi * y / 60)
+    assert cut_of(np.repeat(waves[:, :, None], 3, axis=2), down=True) == (0, 0)
+
+
+def speckled(points: np.ndarray) -> np.ndarray:
+    """A smooth pattern on a ground whose grain is new everywhere."""
+    random = np.random.default_rng(5)
+    return bricks(points) + random.normal(0, 0.06, points.shape[:2])[..., None]
+
+
+def fine(pixels: np.ndarray) -> float:
+    """How strong a picture's grain is."""
+    grey = pixels.mean(axis=2)
+    return float((grey - cv2.GaussianBlur(grey, (0, 0), 1.5)).std())
+
+
+def test_the_mean_keeps_the_grain_that_one_cell_has_everywhere() -> None:
+    photo = painted(SKEWED, speckled)
+    best, kept, smooth = (
+        tile(photo, loads(SKEWED), **changes) for changes in ({"source": "best"}, {}, {"grain": False})
+    )
+    assert fine(smooth.pixels) < 0.5 * fine(best.pixels)
+    assert fine(kept.pixels) == pytest.approx(fine(best.pixels), rel=0.12)
+    width = kept.size.width
+    near, far = kept.pixels[:, : width // 7], kept.pixels[:, width // 3 :]
+    assert fine(near) == pytest.approx(fine(far), rel=0.2), "no less where the tile is blended into itself"
+
+
+def test_grain_is_as_strong_where_a_tile_is_blended_into_itself() -> None:
+    random = np.random.default_rng(3)
+    grain = random.normal(0, 0.05, (200, 200, 3)).astype(np.float32)
+    known = np.ones((200, 200), bool)
+    pixels, _ = wrapped(np.zeros_like(grain), known, Size(140, 140), grain=grain)
+    blended, plain = pixels[60:, 15:45].std(), pixels[60:, 60:].std()
+    assert blended == pytest.approx(plain, rel=0.05)
+
+
+def test_what_one_cell_has_of_its_own_is_no_grain() -> None:
+    random = np.random.default_rng(2)
+    mean = np.full((60, 60, 3), 0.5, np.float32)
+    own = mean + random.normal(0, 0.02, (60, 60, 1)).astype(np.float32)
+    own[20:24, 20:24] += 0.4
+    found = layers((own * 65535).astype(np.uint16), np.ones((60, 60), bool), mean, cell=Size(60, 60))
+    assert np.abs(found.grain).max() < 0.1 < 0.2 < np.abs(found.fine).max()
+    np.testing.assert_allclose(mean + found.shade + found.fine, own, atol=1e-4)
+
+
+def painted_cells(points: np.ndarray) -> np.ndarray:
+    """Cells of UPRIGHT, each of its own colour: red by its column, green by its row."""
+    column, row = np.round(points[..., 0] / 9), np.round(points[..., 1] / 5)
+    return np.stack([0.5 + 0.05 * column, 0.5 + 0.05 * row, np.full(column.shape, 0.4)], -1)
+
+
+def test_a_tile_of_many_cells_shows_neighbours_as_they_are() -> None:
+    found = tile(
+        painted(UPRIGHT, painted_cells), loads(UPRIGHT), cells=(3, 2), light=False, size=Size(180, 80)
+    )
+    assert found.pixels.shape == (80, 180, 3) and found.known.all()
+    assert found.record()["cells_shown"] == [3, 2] and found.record()["from"] == "best"
+    middles = found.pixels[20::40, 30::60]
+    np.testing.assert_allclose(np.diff(middles[..., 0], axis=1), 0.05, atol=0.012)
+    np.testing.assert_allclose(np.diff(middles[..., 1], axis=0), 0.05, atol=0.012)
+    ((column, row),) = found.used
+    expected = [0.5 + 0.05 * column, 0.5 + 0.05 * row]
+    np.testing.assert_allclose(
+        middles[0, 0, :2], expected, atol=0.012, err_msg="the first cell is the one told"
+    )
+
+
+def test_what_many_cells_do_not_show_is_as_usual_and_told() -> None:
+    few = UPRIGHT.replace("range(-4, 5)", "range(0, 3)", 1)
+    found = tile(painted(few, framed), loads(few), cells=(4, 2))
+    assert found.known.all() and any("not seen" in note for note in found.notes)
+
+
+def test_cells_that_cannot_be_are_refused_by_name() -> None:
+    photo = painted(SKEWED, bricks)
+    with pytest.raises(UsageError, match="--from best"):
+        tile(photo, loads(SKEWED), cells=(2, 2), source="mean")
+    with pytest.raises(UsageError, match="one cell high"):
+        tile(painted(RING, bricks), loads(RING), cells=(2, 2))
+    with pytest.raises(UsageError, match="1 to"):
+        tile(photo, loads(SKEWED), cells=(0, 2))
+
+
+@pytest.mark.parametrize(
+    ("seam", "words"),
+    [
+        (Seam(3.0, 3.0, 2.0, None, None, None), "left to right without a visible seam"),
+        (Seam(0.9, 0.3, 0.3, 1.0, 1.0, 1.0), "without a visible seam"),
+        (Seam(3.0, 2.0, 1.0, 1.0, 1.0, 1.0), "a faint seam left to right"),
+        (Seam(1.0, 1.0, 1.0, 9.0, 3.0, 2.0), "a seam shows top to bottom.* 3.0 times"),
+    ],
+)
+def test_a_seam_is_told_in_words(seam: Seam, words: str) -> None:
+    assert re.search(words, seam.sentence())
 
 
 def test_a_lattice_without_a_rectangle_gets_the_nearest_and_says_how_skewed() -> None:
@@ -106,7 +260,7 @@ def test_a_tile_of_a_rendered_lattice_is_its_texture_and_wraps(source: str) -> N
     found = tile(photo, loads(SKEWED), source=source, size=Size(90, 100))
     assert found.record()["cells"] == 2 and found.known.all()
     assert found.seam.ratio < 1.2
-    x, y = (np.arange(90) + 0.5) / 90 - 0.5, (np.arange(100) + 0.5) / 100 - 0.5
+    x, y = ((np.arange(n) + 0.5) / n - 0.5 + moved for n, moved in zip((90, 100), found.cut, strict=True))
     sides = found.patches.cell.sides
     truth = bricks(x[None, :, None] * sides[0] + y[:, None, None] * sides[1])
     scale = (found.pixels * truth).sum() / (truth**2).sum()
