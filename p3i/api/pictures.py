@@ -219,7 +219,7 @@ def find_marred(
     from p3i.paint.fill.found import find_marred as look
 
     image, found = photo_and_program(photo, program, config, progress=progress)
-    return look(doubted(image, found, photo), found, focal_mm=asked.focal_mm)
+    return look(image, found, focal_mm=asked.focal_mm)
 
 
 def extend(

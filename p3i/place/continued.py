@@ -29,9 +29,9 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Box = tuple[float, float, float, float]
 
-# The search widens the box of indices by so many at a time, up to so many objects.
+# The search widens the box of indices by so many, then twice as many each time, up to so many objects.
 _STEP = 4
-_MOST = 40_000
+_MOST = 10_000
 # Cells smaller than this are too near to the horizon to be painted.
 _LEAST_PX = 4.0
 # A cell is looked at in so many places a side.
@@ -234,15 +234,16 @@ def _around(view: _View) -> Index:
     parts = nest(view.laid.pattern.program)
     low, high = view.laid.index.min(0), view.laid.index.max(0)
     drawn = high - low + 1
-    axes = [axis for axis, loop in ((0, parts.for_i), (1, parts.for_j)) if loop is not None]
+    loops = [axis for axis, loop in ((0, parts.for_i), (1, parts.for_j)) if loop is not None]
+    axes = [axis for axis in loops if _moves(view.laid, axis)]
     room = [[_most_turns(parts, axis) - int(drawn[axis])] * 2 for axis in (0, 1)]  # once round, either way
-    grew = True
+    grew, step = True, _STEP // 2
     while grew and int(np.prod(high - low + 1)) < _MOST:
-        grew = False
+        grew, step = False, 2 * step
         for axis in axes:
             unit = (np.arange(2) == axis).astype(np.int64)
             for end in (0, 1):
-                count = int(min(_STEP, max(0, room[axis][end])))
+                count = int(min(step, max(0, room[axis][end])))
                 wider = (low - count * unit, high) if end == 0 else (low, high + count * unit)
                 slab = _box(*wider)
                 slab = slab[(slab[:, axis] < low[axis]) | (slab[:, axis] > high[axis])]
@@ -251,6 +252,12 @@ def _around(view: _View) -> Index:
                     room[axis][end] -= count
     index = _sound(_box(low, high), parts)
     return index[_shown(view, index).in_sight]
+
+
+def _moves(laid: Placed, axis: int) -> bool:
+    """Whether a step of a loop variable, 0 for i and 1 for j, moves what is drawn."""
+    step = (np.arange(2) == axis).astype(np.int64)
+    return bool((np.abs(laid.at(laid.index + step) - laid.points) > 1e-6).any())
 
 
 def _inside(index: Index, bounds: tuple[Bound, ...]) -> Mask:

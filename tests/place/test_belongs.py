@@ -69,7 +69,16 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-COMMANDS = ["show", "rectify", "tile", "points", "score", "extend --by 2%", "inpaint --remove B2", "edit"]
+COMMANDS = [
+    "show",
+    "rectify",
+    "tile",
+    "points",
+    "score",
+    "extend --by 2% --beyond continue",
+    "inpaint --remove B2",
+    "edit",
+]
 
 
 @pytest.mark.parametrize("words", COMMANDS)

@@ -92,7 +92,7 @@ def asked_for(
     remove: Sequence[Named] = (),
     focal_mm: float | None = None,
 ) -> Asked:
-    """What is to be filled, by the arguments of `inpaint`, which says what is raised."""
+    """What is to be filled, bool [H, W], by the arguments of `inpaint`, which says what is raised."""
     hole = np.zeros(photo.valid.shape, bool)
     if isinstance(mask, np.ndarray):
         if mask.shape != hole.shape or mask.dtype != np.bool_:
@@ -125,7 +125,7 @@ def only(laid: Placed, index: Sequence[tuple[int, int]]) -> Placed:
 def facts_of(
     hole: Mask, *, unlike: Mask, guess: Mask, strange: Mask, ground: Mask, reach_px: float
 ) -> tuple[HoleFacts, ...]:
-    """The facts of each hole of a mask, the largest first; `strange` is looked at up to `reach_px` around."""
+    """The facts of each hole of a mask [H, W], largest first; `strange` counts up to `reach_px` around."""
     labels, stats = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)[1:3]
     margin = int(np.ceil(reach_px)) + 1
     found: list[HoleFacts] = []

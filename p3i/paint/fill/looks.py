@@ -33,8 +33,8 @@ _LEAST_SEEN = 0.7
 def sharpness(filled: Floats, known: Mask, hole: Mask, placed: Placed) -> float:
     """The gradient energy in a filled hole over that of the pattern at the same places: 1 is as sharp.
 
-    `filled` is the photo with its hole filled, `known` what of it is the photo's own. nan where no other
-    cell shows the like.
+    `filled` [H, W, 3] is the photo with its `hole` [H, W] filled, `known` [H, W] what is the photo's own. nan
+    where no other cell shows the like.
     """
     energy = _energy(filled)
     within = cv2.erode(hole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -51,7 +51,7 @@ def sharpness(filled: Floats, known: Mask, hole: Mask, placed: Placed) -> float:
 
 
 def seam(filled: Floats, known: Mask, hole: Mask, placed: Placed) -> float:
-    """The mean step across a filled hole's rim over that of the pattern at the same places: 1 shows no seam.
+    """The mean step across a hole's [H, W] rim over that of the pattern at the same places: 1 shows no seam.
 
     Arguments and nan as for `sharpness`.
     """

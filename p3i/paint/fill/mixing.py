@@ -131,7 +131,7 @@ def _energy(colours: Floats, where: Mask, other: Floats | None = None) -> float:
 
 
 def feathered(inside: Mask, radius: int) -> Floats:
-    """A mask's own weight near its rim, so that the weights of pieces side by side add up to 1."""
+    """A mask's [h, w] own weight near its rim, so that the weights of pieces side by side add up to 1."""
     size = 2 * radius + 1
     weights = cv2.blur(inside.astype(np.float32), (size, size), borderType=cv2.BORDER_CONSTANT)
     return np.asarray(weights, np.float32)

@@ -56,11 +56,13 @@ def fill_by_stack(
     a pixel, the surroundings are continued smoothly. Fewer objects tried for each piece is faster.
     """
     known = known & ~hole
-    ground = Ground.of(pixels, known)
+    result = pixels.copy()
+    result[hole] = 0  # nor does what is hidden leave a trace in rounding
+    ground = Ground.of(result, known)
     drawn = drawn_on(placed)
     pieces, labels = pieces_of(hole, drawn, placed)
-    survey = survey_of(pixels, known, placed)
-    total, weight = np.zeros_like(pixels), np.zeros(hole.shape, np.float32)
+    survey = survey_of(result, known, placed)
+    total, weight = np.zeros_like(result), np.zeros(hole.shape, np.float32)
     for done, piece in enumerate(pieces):
         if progress is not None:
             progress("filling", done / len(pieces))
@@ -69,13 +71,11 @@ def fill_by_stack(
     total /= np.maximum(weight, _SHOWN)[:, :, None]
     sure = ground.sure
     del ground, labels, drawn, weight  # a large photo's are much
-    _carry_rim(total, shown, pixels, sure, hole, placed)
-    result = pixels.copy()
+    _carry_rim(total, shown, result, sure, hole, placed)
     filled = hole & shown
     np.copyto(result, np.clip(total, 0, 1, out=total), where=filled[:, :, None])
     bare = hole & ~shown
     if bare.any():
-        result[bare] = 0
         fill_in(result, known | filled, bare)
     return result, bare
 

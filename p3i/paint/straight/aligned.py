@@ -146,6 +146,7 @@ def lit(stack: Aligned, light: Light) -> Aligned:
 
 
 def relit(value: np.ndarray, plane: np.ndarray, light: Light) -> np.ndarray:
+    """Values [..., 3] at places of the plane [..., 2], without the light there."""
     if not len(light.terms):
         return value
     gain = light.gain(plane.astype(np.float32))
@@ -182,7 +183,7 @@ def _median(values: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def registered(stack: Aligned, photo: Image, mean: np.ndarray, *, k1: float | None, light: Light) -> Aligned:
-    """The stack with cells that lie a little off moved onto the mean, where that makes them more alike."""
+    """The stack with cells that lie a little off moved onto the mean [h, w, 3], where that helps."""
     size, larger = stack.size, stack.larger
     if min(size.width, size.height) < 16 or len(stack.pieces) < 3:
         return stack

@@ -148,7 +148,7 @@ def cells_of(photo: Image, placed: Placed, hole: Mask, bare: Mask, *, device: to
 def finer(cells: Cells, photo: Image, hole: Mask, bare: Mask) -> Cells:
     """The same cells with up to `_FINE` times as many pixels a side, as far as the photo has them.
 
-    The arguments are those of `cells_of`.
+    The arguments are those of `cells_of`, `hole` and `bare` [H, W].
     """
     longer = max(cells.known.shape)
     wanted = min(photo.size.longer, round(longer * _FINE))

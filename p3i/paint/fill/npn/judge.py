@@ -77,7 +77,10 @@ class Jury:
 def judged(
     photo: Image, placed: Placed, hole: Mask, cells: Cells, pool: Pool, tasks: list[Task], *, seed: int
 ) -> Jury | None:
-    """Cells set aside, filled by the stack; None where the photo has too few. `cells` must hide the hole."""
+    """Cells set aside, filled by the stack; None where the photo has too few.
+
+    `cells` must hide the `hole` [H, W].
+    """
     places = teachers(cells, pool).cpu()
     chance = torch.Generator().manual_seed(seed + 1)
     known = photo.valid & ~hole

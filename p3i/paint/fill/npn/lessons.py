@@ -27,7 +27,7 @@ _AT_ONCE = 16
 
 
 def teachers(cells: Cells, pool: Pool) -> Tensor:
-    """The places in the pool whose cells can be learned from: all is known in them, and much around."""
+    """The places [T] in the pool whose cells can be learned from: all is known in them, and much around."""
     own = torch.from_numpy(cells.cell).to(cells.device)[None]
     known = pool.known[:, 0]
     inside = (known * own).sum((1, 2)) / own.sum()
@@ -93,7 +93,7 @@ def _moved(hole: Tensor, across: int, down: int) -> Tensor:
 
 
 def part_of(batch: Batch, places: Tensor) -> Batch:
-    """Those of a batch's stacks at these places."""
+    """Those of a batch's stacks at these places [T]."""
     return Batch(*(getattr(batch, one.name)[places] for one in fields(Batch)))
 
 

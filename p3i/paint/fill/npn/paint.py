@@ -159,7 +159,7 @@ def _trained(
 
 
 def tasks_of(cells: Cells, placed: Placed, hole: Mask) -> list[Task]:
-    """The hidden cells: the hole split by the program's centres, as far as each one's patch reaches."""
+    """The hidden cells: the hole [H, W] split by the program's centres, as far as each patch reaches."""
     points = np.argwhere(hole)[:, ::-1].astype(float)
     on_plane, front = project(np.linalg.inv(placed.image_from_plane), points)
     own = np.where(front, nearest(placed, on_plane), -1)

@@ -20,8 +20,10 @@ SHA256 = "3162fac52084dc9e73fc613b86453352c0af41701c3e5bf26793ef7cc85aaaa0"
 
 
 def shipped() -> dict[str, dict[str, Tensor]]:
-    """The weights of "generator" and "discriminator", float32. Raises FileError where the file is not
-    ours."""
+    """The weights of "generator" and "discriminator" by their names, float32 [...].
+
+    Raises FileError where the file is not ours.
+    """
     try:
         data = (resources.files("p3i.paint.fill.npn") / NAME).read_bytes()
     except OSError:
@@ -34,7 +36,7 @@ def shipped() -> dict[str, dict[str, Tensor]]:
 
 
 def unpacked(data: bytes) -> dict[str, dict[str, Tensor]]:
-    """The weights in a file that `packed` made."""
+    """The weights in a file that `packed` made, float32 [...] by network and name."""
     found: dict[str, dict[str, Tensor]] = {"generator": {}, "discriminator": {}}
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         for name in arrays.files:

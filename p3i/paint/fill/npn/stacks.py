@@ -130,7 +130,7 @@ def stacks_of(
 
 
 def finer(found: Laid, batch: Batch, cells: Cells, fine: Cells, numbers: Tensor) -> Laid:
-    """The same sources laid more exactly, on patches of the same ground with more pixels (cells.finer)."""
+    """The same sources of cells `numbers` [B] laid more exactly, on patches with more pixels."""
     size = (fine.patch.height, fine.patch.width)
     # A pixel wider, that nothing of the hole is mixed in.
     holes = F.interpolate(F.max_pool2d(batch.hole, 3, 1, 1), size, mode="nearest")

@@ -57,7 +57,7 @@ class Training:
 def begun(
     *, seed: int, device: torch.device, rate: float, weights: Mapping[str, Mapping[str, Tensor]] | None = None
 ) -> Training:
-    """A training before its first step, from chance or from `weights` of "generator" and "discriminator".
+    """A training before its first step, from chance or from `weights` [...] of both networks.
 
     PyTorch's own source of chance is left as it was.
     """
