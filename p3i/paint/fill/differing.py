@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import torch
 from numpy.typing import NDArray
-from scipy.special import log_ndtr
 
 from p3i.paint.fill.cutout import sampled_cells
 from p3i.place.moves import frames
@@ -87,7 +87,7 @@ def differing(placed: Placed, photo: Image, *, hole: Mask | None = None) -> Diff
     least = _least_differences(colours, known, asked, others, places)
     usual, spread = _usual(least)
     tall = np.clip((np.log(np.maximum(least, 1e-3)) - usual) / spread, 0, None)
-    bits = -log_ndtr(-tall) / np.log(2)
+    bits = -torch.special.log_ndtr(torch.from_numpy(-tall)).numpy() / np.log(2)
     bits = np.where(np.isfinite(least) & (least > _LEAST_SEEN), bits, 0)
     found = np.zeros(seen.shape, np.float32)
     found[judged[asked]] = bits
