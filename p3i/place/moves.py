@@ -67,6 +67,12 @@ def frames(placed: Placed) -> Array:
     return found
 
 
+def nearest_px(placed: Placed, pixel: Array) -> int:
+    """The object in front of the camera that lies nearest to a pixel [2] of the photo."""
+    pixels, front = placed.centers_px()
+    return int(np.argmin(np.where(front, np.hypot(*(pixels - pixel).T), np.inf)))
+
+
 def pitch_px(placed: Placed, target: int) -> float:
     """How far the nearest other object lies from object `target` on the photo, in pixels, at least 2."""
     pixels, front = placed.centers_px()

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +26,7 @@ from p3i.grammar.printer import format_program
 from p3i.options.extend import SIDES, Beyond, ExtendOptions
 from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
+from p3i.paint.fill.pieces import cells_on
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.continued import Continued, continued, widened
 from p3i.place.flat import Flat, flat_of
@@ -214,13 +214,7 @@ def _wider(laid: Placed, sides: Sides, size: Size) -> Placed:
 
 def _ground(wide: Placed) -> Mask:
     """The pixels of the new picture that lie in a cell: bool [H, W]."""
-    cells, front = project(wide.image_from_plane, polygons(chart_of(wide.pattern), wide.index))
-    ground = np.zeros((wide.size.height, wide.size.width), np.uint8)
-    limit = 4 * (wide.size.width + wide.size.height)
-    for cell, ahead in zip(cells, np.asarray(front.all(1)), strict=True):
-        if ahead and np.abs(cell).max() < limit:
-            cv2.fillPoly(ground, [np.rint(cell * 16).astype(np.int32)], 1, shift=4)
-    return ground > 0
+    return cells_on(wide, most_px=4 * (wide.size.width + wide.size.height)) > 0
 
 
 def _laid_out(flat: Flat, sides: Sides, size: Size) -> tuple[Floats, Mask, Mask]:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from p3i.paint.fill.cutout import Cutout
 from p3i.paint.fill.grain import Grain
 from p3i.paint.fill.light import carried, rim_of
-from p3i.place.moves import frames, pitch_px
+from p3i.paint.fill.pieces import padded
+from p3i.place.moves import frames, nearest_px, pitch_px
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
 from p3i.vision.fill import eroded, filled
@@ -200,15 +201,11 @@ def _even(values: Floats, ground: Mask, *, sigma: float) -> Floats:
 def _holes(wanted: Mask, placed: Placed) -> Iterator[tuple[slice, slice, NDArray[np.uint8], float]]:
     """What hangs together of the mask: window, mask in it, and how far the next object lies, in pixels."""
     labels, stats, middles = cv2.connectedComponentsWithStats(wanted.astype(np.uint8), connectivity=4)[1:]
-    pixels, front = placed.centers_px()
-    front_px = np.where(front[:, None], pixels, np.inf)
     for label in range(1, len(stats)):
-        x, y, width, height = stats[label, :4].tolist()
-        target = int(np.argmin(np.hypot(*(front_px - middles[label]).T)))
-        margin = int(np.ceil(_RIM_PX)) + 1
-        rows = slice(max(0, y - margin), y + height + margin)
-        columns = slice(max(0, x - margin), x + width + margin)
-        yield rows, columns, (labels[rows, columns] == label).astype(np.uint8), pitch_px(placed, target)
+        left, top, right, bottom = padded(stats[label], wanted.shape, by_px=int(np.ceil(_RIM_PX)) + 1)
+        rows, columns = slice(top, bottom), slice(left, right)
+        spacing = pitch_px(placed, nearest_px(placed, middles[label]))
+        yield rows, columns, (labels[rows, columns] == label).astype(np.uint8), spacing
 
 
 def _typical(detail: Floats, ground: Mask) -> Mask:

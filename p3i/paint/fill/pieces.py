@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.place.moves import nearest, pitch_px
+from p3i.place.moves import nearest, nearest_px, pitch_px
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
 from p3i.vision.sheet import project
@@ -52,13 +52,18 @@ class Piece:
 
 def drawn_on(placed: Placed) -> NDArray[np.uint8]:
     """Where on the photo the pattern's cells lie, 1 [H, W]."""
-    drawn = np.zeros((placed.size.height, placed.size.width), np.uint8)
-    corners = polygons(chart_of(placed.pattern), placed.index)
-    pixels, front = project(placed.image_from_plane, corners)
-    most = 4.0 * max(placed.size.width, placed.size.height)
-    for outline in pixels[front.all(1) & (np.abs(pixels) < most).all((1, 2))]:
-        cv2.fillPoly(drawn, [np.rint(outline * 16).astype(np.int32)], 1, shift=4)
+    drawn = cells_on(placed, most_px=4 * max(placed.size.width, placed.size.height))
     return np.asarray(cv2.dilate(drawn, np.ones((2 * _SLACK_PX + 1,) * 2, np.uint8)), np.uint8)
+
+
+def cells_on(placed: Placed, *, most_px: float) -> NDArray[np.uint8]:
+    """Where on the photo the program's cells lie, 1 [H, W], but those with a corner beyond `most_px`."""
+    drawn = np.zeros((placed.size.height, placed.size.width), np.uint8)
+    pixels, front = project(placed.image_from_plane, polygons(chart_of(placed.pattern), placed.index))
+    for outline in pixels[front.all(1) & (np.abs(pixels) < most_px).all((1, 2))]:
+        # In sixteenths of a pixel, so that outlines are met as closely as pixels allow.
+        cv2.fillPoly(drawn, [np.rint(outline * 16).astype(np.int32)], 1, shift=4)
+    return drawn
 
 
 def pieces_of(
@@ -72,7 +77,7 @@ def pieces_of(
     count, parts, boxes, _ = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
     pieces: list[Piece] = []
     for part in range(1, count):
-        left, top, right, bottom = _padded(boxes[part], hole.shape)
+        left, top, right, bottom = padded(boxes[part], hole.shape, by_px=_NEAR_PX)
         window = (slice(top, bottom), slice(left, right))
         inside = parts[window] == part
         found = 2 * _nearest_in((left, top, right, bottom), placed) + (drawn[window] == 0)
@@ -104,20 +109,19 @@ def _as_many(cells: NDArray, counts: NDArray) -> float:
     return float(sizes.sum() ** 2 / (sizes**2).sum())
 
 
-def _padded(box: NDArray, shape: tuple[int, ...]) -> Box:
+def padded(box: NDArray, shape: tuple[int, ...], *, by_px: int) -> Box:
+    """A box (x, y, width, height, ...) as OpenCV tells it, wider on each side within a picture [H, W]."""
     left, top, wide, high = (int(value) for value in box[:4])
     return (
-        max(0, left - _NEAR_PX), max(0, top - _NEAR_PX),
-        min(shape[1], left + wide + _NEAR_PX), min(shape[0], top + high + _NEAR_PX),
+        max(0, left - by_px), max(0, top - by_px),
+        min(shape[1], left + wide + by_px), min(shape[0], top + high + by_px),
     )  # fmt: skip
 
 
 def _nearest_in(box: Box, placed: Placed) -> NDArray[np.int32]:
     """The object nearest to each pixel of a box [h, w]; where cells are large, to a block of pixels."""
     left, top, right, bottom = box
-    pixels, front = placed.centers_px()
-    middle = ((left + right) / 2, (top + bottom) / 2)
-    target = int(np.argmin(np.where(front, np.hypot(*(pixels - middle).T), np.inf)))
+    target = nearest_px(placed, np.array([(left + right) / 2, (top + bottom) / 2]))
     step = int(np.clip(pitch_px(placed, target) / _FINE, 1, _COARSEST))
     plane_from_image = np.linalg.inv(placed.image_from_plane)
     x = left + np.arange(0, right - left, step) + (step - 1) / 2

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from p3i.paint.fill.light import matched_light
 from p3i.paint.fill.matching import aligned
 from p3i.paint.fill.survey import Survey
-from p3i.place.moves import moves, nearest, pitch_px
+from p3i.place.moves import moves, nearest, nearest_px, pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
@@ -72,7 +72,7 @@ class Hole:
     @property
     def share(self) -> float:
         """How much what lies around counts beside what all cells tell: half where a tenth of it is known."""
-        return self.surrounded / (self.surrounded + _ALL_CELLS)
+        return _beside_all_cells(self.surrounded)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,9 +166,7 @@ def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed, *, target
     It is seen from the object `target`, without one from that nearest to its middle.
     """
     if target is None:
-        pixels, front = placed.centers_px()
-        away = np.hypot(*(pixels - points.mean(0)).T)
-        target = int(np.argmin(np.where(front, away, np.inf)))
+        target = nearest_px(placed, points.mean(0))
     spacing = pitch_px(placed, target)
     margin = max(4, round(_MARGIN * spacing))
     low = np.maximum(points.min(0).astype(int) - margin, 0)
@@ -347,6 +345,11 @@ def _judged(hole: Hole, misfit: float, weights: Floats, expected: float) -> floa
 def _share(hole: Hole, weights: Floats) -> float:
     """How much the surroundings that a source shows tell."""
     shown = hole.surrounded * float(weights.sum()) / max(float(hole.weights.sum()), 1e-9)
+    return _beside_all_cells(shown)
+
+
+def _beside_all_cells(shown: float) -> float:
+    """How much surroundings of which this share is known count beside what all cells tell."""
     return shown / (shown + _ALL_CELLS)
 
 

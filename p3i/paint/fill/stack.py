@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from p3i.paint.fill.light import membrane, rim_of
 from p3i.paint.fill.matching import trusted
 from p3i.paint.fill.mixing import feathered, painted
-from p3i.paint.fill.pieces import Piece, drawn_on, pieces_of
+from p3i.paint.fill.pieces import Piece, drawn_on, padded, pieces_of
 from p3i.paint.fill.sources import MOST_TRIED, Ground, Hole, Source, hole_of, shown_elsewhere, sources
 from p3i.paint.fill.survey import Survey, survey_of
-from p3i.place.moves import pitch_px
+from p3i.place.moves import nearest_px, pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.fill import fill_in
 from p3i.vision.warp import taken
@@ -162,48 +162,19 @@ def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     return trusted(np.stack(residuals), hole.weights, misfits, share=hole.share)
 
 
-def mixed(
-    points: Array, ground: Ground, found: list[Source], weights: Array, *, sharp: bool
-) -> tuple[Floats, Array]:
-    """The sources' colours at the hole's points, mixed [L, 3], and the weight of those that show them [L].
-
-    Each of the `weights` is one number a source, [S], or one for each point, [S, L].
-    """
-    total, weight = np.zeros((len(points), 3)), np.zeros(len(points))
-    for source, share in zip(found, weights, strict=True):
-        if np.max(share) < 1e-4:
-            continue
-        at, front = source.where(points)
-        shown = share * (front & ground.known(at))
-        total += shown[:, None] * (source.gain * taken(ground.pixels, at, sharp=sharp) + source.offset)
-        weight += shown
-    return (total / np.maximum(weight, 1e-9)[:, None]).astype(np.float32), weight
-
-
 def _carry_rim(total: Floats, shown: Mask, pixels: Floats, sure: Floats, hole: Mask, placed: Placed) -> None:
     """Add to the fill `total` what the photo differs by from it at the hole's rim, carried inwards."""
-    centers, front = placed.centers_px()
     _, parts, boxes, middles = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
-    height, width = hole.shape
     for number in range(1, len(boxes)):
-        left, top, right, bottom = _around(boxes[number], _RIM_PX + 1, width, height)
+        left, top, right, bottom = padded(boxes[number], hole.shape, by_px=_RIM_PX + 1)
         window = (slice(top, bottom), slice(left, right))
         inside = (parts[window] == number).astype(np.uint8)
         rim = rim_of(inside, (sure[window] > 0) & shown[window], reach_px=_RIM_PX)
         if not rim.any():
             continue
-        away = np.hypot(*(centers - middles[number]).T)
-        spacing = pitch_px(placed, int(np.argmin(np.where(front, away, np.inf))))
+        spacing = pitch_px(placed, nearest_px(placed, middles[number]))
         off = np.zeros((*rim.shape, 3), np.float32)
         off[rim] = pixels[window][rim] - total[window][rim]
         lift = membrane(off, rim, spacing_px=spacing)
         del off
         np.add(total[window], lift, out=total[window], where=inside[..., None] > 0)
-
-
-def _around(box: NDArray, margin: int, width: int, height: int) -> tuple[int, int, int, int]:
-    left, top, wide, high = (int(value) for value in box[:4])
-    return (
-        max(0, left - margin), max(0, top - margin),
-        min(width, left + wide + margin), min(height, top + high + margin),
-    )  # fmt: skip
