@@ -1,7 +1,7 @@
 """The pieces of a hole: each hidden pixel belongs to the nearest object's cell, inside the pattern or
 beyond it.
 
-A hole of few cells is one piece: what is seen around it binds all of it together.
+Of few cells a hole is one piece in the pattern and one beyond: what is seen around binds them together.
 
 Convention: masks bool [H, W].
 """
@@ -39,13 +39,12 @@ _SLACK_PX = 1
 class Piece:
     """A part of a hole, seen from one object: what lies in its cell, or a small hole of its own.
 
-    `number` is that of its pixels; `box` (left, top, right, bottom; half-open) holds them all. `drawn` is
-    whether it is a cell of the pattern: only such ground is like it. `beyond` the pattern nothing is.
+    `number` is that of its pixels; `box` (left, top, right, bottom; half-open) holds them all. What lies
+    `beyond` the pattern is like nothing of it, nor the other way round.
     """
 
     number: int
     target: int
-    drawn: bool
     beyond: bool
     box: Box
 
@@ -81,21 +80,24 @@ def pieces_of(
         window = (slice(top, bottom), slice(left, right))
         inside = parts[window] == part
         found = 2 * _nearest_in((left, top, right, bottom), placed) + (drawn[window] == 0)
-        numbers, counts = np.unique(found[inside], return_counts=True)
-        if _as_many(numbers // 2, counts) <= few:
-            rows, columns = np.nonzero(inside)
-            middle = np.array([[left + columns.mean(), top + rows.mean()]])
-            target = int(nearest(placed, project(np.linalg.inv(placed.image_from_plane), middle)[0])[0])
-            found[:] = 0
-            kinds = {0: (target, False, False)}
-        else:
-            kinds = {number: (number // 2, number % 2 == 0, number % 2 == 1) for number in numbers.tolist()}
+        kinds: dict[int, tuple[int, bool]] = {}
+        # What lies in the pattern and what lies beyond it are unlike, however small the hole.
+        for beyond in (0, 1):
+            side = inside & (found % 2 == beyond)
+            numbers, counts = np.unique(found[side], return_counts=True)
+            if not len(numbers):
+                continue
+            if not beyond and _as_many(counts) <= few:
+                target = _nearest_to_middle(side, (left, top), placed)
+                found[found % 2 == beyond] = 2 * target + beyond
+                numbers = [2 * target + beyond]
+            kinds |= {int(number): (int(number) // 2, beyond == 1) for number in numbers}
         # What lies near two holes is the nearer's: of its own pixels, else of the first.
         given = inside | (labels[window] < 0)
         lasting = np.full(int(found.max()) + 1, -1, np.int32)
-        for number, (target, is_drawn, beyond) in kinds.items():
+        for number, (target, beyond) in kinds.items():
             lasting[number] = len(pieces)
-            pieces.append(Piece(len(pieces), target, is_drawn, beyond, (0, 0, 0, 0)))
+            pieces.append(Piece(len(pieces), target, beyond, (0, 0, 0, 0)))
         labels[window] = np.where(given, lasting[found], labels[window])
         extents = _boxes(np.where(inside, labels[window], -1), left, top)
         for number, box in extents.items():
@@ -103,10 +105,17 @@ def pieces_of(
     return pieces, labels
 
 
-def _as_many(cells: NDArray, counts: NDArray) -> float:
-    """How many cells of one size a hole is worth: slivers of further ones count as slivers."""
-    sizes = np.bincount(np.unique(cells, return_inverse=True)[1], counts)
+def _as_many(counts: NDArray) -> float:
+    """How many cells of one size a hole is worth of so many pixels each: slivers count as slivers."""
+    sizes = counts.astype(float)
     return float(sizes.sum() ** 2 / (sizes**2).sum())
+
+
+def _nearest_to_middle(inside: Mask, corner: tuple[int, int], placed: Placed) -> int:
+    """The object nearest to the middle of what is `inside` [h, w] of a window at `corner`."""
+    rows, columns = np.nonzero(inside)
+    middle = np.array([[corner[0] + columns.mean(), corner[1] + rows.mean()]])
+    return int(nearest(placed, project(np.linalg.inv(placed.image_from_plane), middle)[0])[0])
 
 
 def padded(box: NDArray, shape: tuple[int, ...], *, by_px: int) -> Box:

@@ -8,7 +8,7 @@ Convention: points are pixels of the photo [L, 2]; colours RGB in 0..1.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -209,7 +209,7 @@ def sources(
         return []
     asked = hole.points[:: max(1, len(hole.points) // _PROBES)]
     misfits = np.full(len(placed.points), np.inf) if survey is None else survey.misfits(hole.target)
-    found: list[tuple[float, int, Array, float, Mask]] = []
+    tried: list[_Tried] = []
     for number, matrix in _laid_on(hole, ground, placed, most=most, survey=survey, checked=allowed is None):
         at, front = project(matrix, asked)
         shown = front & ground.known(at)
@@ -219,16 +219,16 @@ def sources(
         if shown.mean() < _LEAST_OF_HOLE:
             continue
         expected = _expected_misfit(hole, matrix, float(misfits[number]))
-        misfit = _first_misfit(hole, ground, matrix, number, survey, expected)
-        if np.isfinite(misfit):
-            found.append((misfit, number, matrix, expected, shown))
-    found.sort(key=lambda one: one[0])
+        around, share = _first_misfit(hole, ground, matrix, number, survey)
+        if np.isfinite(expected) or share:
+            tried.append(_Tried(number, matrix, shown, around, share, expected))
+    found = sorted(_on_one_scale(tried), key=_Tried.misfit)
     finely = max(_TRIED_FINELY, kept)
 
-    def fine(one: tuple[float, int, Array, float, Mask]) -> Source:
-        return _aligned(hole, ground, one[2], one[1], survey, one[3])
+    def fine(one: _Tried) -> Source:
+        return _aligned(hole, ground, one, survey)
 
-    alike = sorted(((fine(one), one[4]) for one in found[:finely]), key=lambda one: one[0].misfit)
+    alike = sorted(((fine(one), one.shown) for one in found[:finely]), key=lambda one: one[0].misfit)
     result: list[Source] = []
     covered = np.zeros(len(asked), bool)
     for source, shown in alike:
@@ -240,9 +240,9 @@ def sources(
             result.append(source)
             covered |= shown
     for one in found[finely:]:
-        if (one[4] & ~covered).any():
+        if (one.shown & ~covered).any():
             result.append(fine(one))
-            covered |= one[4]
+            covered |= one.shown
     return result
 
 
@@ -297,19 +297,56 @@ def _laid_on(
         yield number, placed.image_from_plane @ move @ plane_from_image
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tried:
+    """An object that may be a source, by its matrix [3, 3], and what of the probes it shows.
+
+    `around` is how much it differs around the hole, which counts by its `share`; `expected` how much it does
+    from what is expected in the hole, or inf.
+    """
+
+    number: int
+    from_hole: Array
+    shown: Mask
+    around: float
+    share: float
+    expected: float
+
+    def misfit(self, around: float | None = None) -> float:
+        """Both as one, each as far as it tells."""
+        around = self.around if around is None else around
+        if not np.isfinite(self.expected):
+            return around
+        return float(np.sqrt(self.share * around**2 + (1 - self.share) * self.expected**2))
+
+
+def _on_one_scale(tried: list[_Tried]) -> list[_Tried]:
+    """Those tried with what they are expected to be off by in the measure of what they are off by around.
+
+    Else one that shows nothing of the surroundings would be ranked by another measure than the rest.
+    """
+    both = [one for one in tried if one.share > 0 and np.isfinite(one.expected)]
+    if not both:
+        return tried
+    scale = float(np.median([one.around for one in both]) / max(np.median([one.expected for one in both]), 1e-6))
+    return [replace(one, expected=scale * one.expected) for one in tried]
+
+
 def _first_misfit(
-    hole: Hole, ground: Ground, from_hole: Array, number: int, survey: Survey | None, expected: float
-) -> float:
-    """How unlike a source is before it is shifted; inf where too little tells."""
+    hole: Hole, ground: Ground, from_hole: Array, number: int, survey: Survey | None
+) -> tuple[float, float]:
+    """How unlike a source is around the hole before it is shifted, and how much that tells (0..1)."""
     light = None if survey is None else survey.light(hole.target, number)
     at, weights = _around(hole, ground, from_hole)
     if not weights.any():
-        return expected
+        return 0.0, 0.0
     colours = taken(ground.pixels, at)
-    share = 1.0 if survey is None else _share(hole, weights)
-    gain, offset = matched_light(colours, hole.colours, weights, light=light, share=share)
+    share = _share(hole, weights)
+    gain, offset = matched_light(
+        colours, hole.colours, weights, light=light, share=1.0 if survey is None else share
+    )
     off = np.abs(hole.colours - gain * colours - offset)
-    return _judged(hole, float((weights[:, None] * off).sum() / weights.sum() / 3), weights, expected)
+    return float((weights[:, None] * off).sum() / weights.sum() / 3), share
 
 
 def _expected_misfit(hole: Hole, from_hole: Array, misfit: float) -> float:
@@ -334,14 +371,6 @@ def _around(hole: Hole, ground: Ground, from_hole: Array) -> tuple[Array, Floats
     return at, weights
 
 
-def _judged(hole: Hole, misfit: float, weights: Floats, expected: float) -> float:
-    """A source's misfit around its hole and to the expected cell as one, each as far as it tells."""
-    if not np.isfinite(expected):
-        return misfit
-    share = _share(hole, weights)
-    return float(np.sqrt(share * misfit**2 + (1 - share) * expected**2))
-
-
 def _share(hole: Hole, weights: Floats) -> float:
     """How much the surroundings that a source shows tell."""
     shown = hole.surrounded * float(weights.sum()) / max(float(hole.weights.sum()), 1e-9)
@@ -353,15 +382,13 @@ def _beside_all_cells(shown: float) -> float:
     return shown / (shown + _ALL_CELLS)
 
 
-def _aligned(
-    hole: Hole, ground: Ground, from_hole: Array, number: int, survey: Survey | None, expected: float
-) -> Source:
-    """The source under this matrix, shifted and in the hole's light."""
-    light = None if survey is None else survey.light(hole.target, number)
-    at, weights = _around(hole, ground, from_hole)
+def _aligned(hole: Hole, ground: Ground, one: _Tried, survey: Survey | None) -> Source:
+    """The source that was tried, shifted and in the hole's light."""
+    light = None if survey is None else survey.light(hole.target, one.number)
+    at, weights = _around(hole, ground, one.from_hole)
     if not weights.any():
         gain, offset = light if light is not None else (np.ones(3), np.zeros(3))
-        return Source(from_hole, np.zeros(2), gain, offset, expected, number)
+        return Source(one.from_hole, np.zeros(2), gain, offset, one.misfit(), one.number)
 
     def read(shift: Array) -> Floats:
         return taken(ground.pixels, at + shift)
@@ -372,10 +399,10 @@ def _aligned(
         weights=weights,
         most_px=_MOST_SHIFT * hole.spacing_px,
         light=light,
-        share=1.0 if survey is None else _share(hole, weights),
+        share=1.0 if survey is None else one.share,
         likely_px=np.inf if survey is None else survey.likely_off * hole.spacing_px,
     )
-    return Source(from_hole, shift, gain, offset, _judged(hole, misfit, weights, expected), number)
+    return Source(one.from_hole, shift, gain, offset, one.misfit(misfit), one.number)
 
 
 def _spacing(placed: Placed, target: int) -> float:

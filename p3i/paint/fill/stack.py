@@ -120,9 +120,7 @@ def _fill(
     one = hole_of(points, ground.pixels, known, placed, target=piece.target)
     if piece.beyond and not one.weights.any():
         return
-    allowed = drawn if piece.drawn else None
-    if piece.beyond:
-        allowed = 1 - drawn
+    allowed = 1 - drawn if piece.beyond else drawn
     found = sources(one, ground, placed, most=most, survey=survey, allowed=allowed)
     if not found:
         return

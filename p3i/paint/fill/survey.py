@@ -8,13 +8,14 @@ Convention: program units on the plane of one cell, the `reference`; colours RGB
 places of the grid.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.field import Field, field_of
+from p3i.paint.fill.kinds import kinds_of, turns_of
 from p3i.place.moves import moves
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
@@ -35,6 +36,8 @@ _LEAST_SEEN = 0.25
 # So many places of a cell tell how alike cells are, and so many cells over which widths, in steps, they are.
 _TOLD, _JUDGED = 200, 200
 _WIDTHS = (0.6, 1.2, 2.4, 5.0, 20.0)
+# Cells of another kind count so little beside those of the same.
+_OTHER_KIND = 1e-4
 # Light does not change within so many steps: what does is the objects' own colour.
 _LIGHT = 3.0
 # Contrast is drawn towards 1 as if by this variance: flat cells say nothing of it.
@@ -52,6 +55,7 @@ class Survey:
     """The cells: `seen` [M] in shares; `lit` [M, P, 3] is each in the common light, `shown` [M, P] where it
     is known.
 
+    `kinds` [M] number the kinds of cell that take turns.
     `levels`, `contrasts` [M, 3] are the light there by its field, `offs` [M, 2] the shift, on the
     reference's plane; `own_offs` [M, 2] are each cell's own, drawn to the field by how surely it tells;
     `turns` [M, 2, 2] bring the reference's plane to that of each. `places` [M, 2] lie on the plane. Cells
@@ -63,6 +67,7 @@ class Survey:
     seen: Array
     lit: Floats
     shown: Mask
+    kinds: NDArray[np.int64]
     at: Array
     widths: Array
     likely_off: float
@@ -83,6 +88,7 @@ class Survey:
         """
         apart = (self.at - self.at[target]) / self.widths
         near = np.exp(-0.5 * (apart**2).sum(1)).astype(np.float32)
+        near *= _of_one_kind(self.kinds, self.kinds[target])
         near[target] = 0
         expected = _mean_of(self.lit, self.shown, near[None])[0]
         own = self.shown[target]
@@ -102,119 +108,224 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     at_px, front = placed.centers_px()
     if int((front & placed.in_sight()).sum()) < _FEWEST:
         return None
-    count = len(placed.points)
     reference = int(
         np.argmin(np.where(placed.in_sight(), np.hypot(*(at_px - np.median(at_px[front], 0)).T), np.inf))
     )
-    corners = polygons(chart_of(placed.pattern), placed.index[reference : reference + 1])[0]
-    low, high = corners.min(0), corners.max(0)
-    side = int(np.clip(np.sqrt(_SAMPLES / count), *_SIDES))
-    steps = (np.arange(side) + 0.5) / side
-    grid = np.stack(np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1])), -1)
-    inside = np.zeros((side, side), np.uint8)
-    on_grid = (corners - low) / (high - low) * side - 0.5
-    cv2.fillPoly(inside, [np.rint(on_grid * 16).astype(np.int32)], 1, shift=4)
-    plane_moves = moves(placed, reference)
-    usable = np.isfinite(plane_moves).all((1, 2))
-    plane_moves[~usable] = 0
-
-    def read(offs: Array) -> tuple[Floats, Mask]:
-        points = grid[None] + offs[:, None, None]
-        points = (
-            np.einsum("mij,mrcj->mrci", plane_moves[:, :2, :2], points) + plane_moves[:, None, None, :2, 2]
-        )
-        at, ahead = project(placed.image_from_plane, points)
-        spacing = np.maximum(*(np.linalg.norm(np.gradient(at, axis=axis), axis=-1) for axis in (1, 2)))
-        flat = (count * side, side)
-        found = sampled(
-            pixels, known, at.reshape(*flat, 2), ahead.reshape(flat), spacing.reshape(flat),
-            box=Box(0, 1, 0, 1), side=side,
-        )  # fmt: skip
-        seen = found.seen.reshape(count, side, side) & (inside > 0) & np.asarray(usable)[:, None, None]
-        return found.values.transpose(1, 2, 0).reshape(count, side, side, 3), seen
-
-    offs, most = np.zeros((count, 2)), _MOST_OFF * float((high - low).min())
-    share, telling = np.zeros(count), np.zeros(count, bool)
-    step = (high - low) / side
-    information = np.zeros((count, 2, 2))
-    levels, contrasts, misfit = np.zeros((count, 3)), np.ones((count, 3)), np.full(count, np.inf)
-    variance, seen = np.zeros((count, 3)), np.zeros((count, side, side), bool)
-    colours, middle = np.zeros((count, side, side, 3), np.float32), np.zeros(3)
-    for _ in range(2):
-        colours, seen = read(offs)
-        share = seen.sum((1, 2)) / max(int(inside.sum()), 1)
-        telling = share >= _LEAST_SEEN
-        if telling.sum() < _FEWEST:
-            return None
-        weights = seen.astype(np.float32)
-        common = _common(colours, seen, share, None)
-        for _ in range(2):
-            levels, contrasts, variance = _light(colours, weights, common)
-            common = _common(colours, seen, share, (levels, contrasts, common[inside > 0].mean(0)))
-        middle = common[inside > 0].mean(0)
-        levels, contrasts, variance = _light(colours, weights, common)
-        lit = (colours - levels[:, None, None]) / contrasts[:, None, None] + middle
-        residual = (common - lit) * weights[..., None]
-        misfit = np.abs(residual).sum((1, 2, 3)) / np.maximum(3 * weights.sum((1, 2)), 1)
-        slopes = [np.gradient(common, axis=axis) / width for axis, width in ((1, step[0]), (0, step[1]))]
-        found, information = _steps(slopes, residual, weights)
-        offs = np.clip(offs + np.where(telling[:, None], found, 0), -most, most)
-    information[~telling] = 0
-    basis = placed.basis
-    at = (
-        placed.index.astype(float)
-        if basis is not None
-        else placed.points / _spacing(placed.points, reference)
-    )
+    grid = _Grid.of(placed, reference)
     spacing = _spacing(placed.points, reference)
+    basis = placed.basis
+    at = placed.index.astype(float) if basis is not None else placed.points / spacing
+    together = basis is None
+    told_at = np.argwhere(grid.inside)
+    told_at = told_at[:: max(1, len(told_at) // _TOLD)].T
+
+    colours, seen = grid.read(pixels, known, placed, None)
+    kinds = np.zeros(len(placed.points), np.int64)
+    cells = _side_by_side(colours, seen, grid.inside, kinds)
+    if cells is None:
+        return None
+    _, _, few = cells.lit(placed.points, spacing, colours[:, *told_at])
+    shown = seen[:, *told_at]
+    telling = np.flatnonzero(cells.telling)
+    kinds[:] = _kinds(placed, few, shown, at, telling, together=together)
+    offs = np.zeros((len(placed.points), 2))
+    information = np.zeros((len(placed.points), 2, 2))
+    for turn in range(2):
+        if turn:
+            colours, seen = grid.read(pixels, known, placed, offs)
+        if turn or kinds.any():
+            cells = _side_by_side(colours, seen, grid.inside, kinds)
+            if cells is None:
+                return None
+        steps, information = _steps(
+            grid.slopes(cells.commons), kinds, cells.residual(colours, seen), seen.astype(np.float32)
+        )
+        offs = np.clip(offs + np.where(cells.telling[:, None], steps, 0), -grid.most_off, grid.most_off)
+    information[~cells.telling] = 0
     off = field_of(placed.points, offs, information, towards=np.zeros(2), spacing=spacing)
-    smooth_offs = np.clip(off.at(placed.points), -most, most)
+    smooth_offs = np.clip(off.at(placed.points), -grid.most_off, grid.most_off)
     # Each cell's own shift is drawn to the field's by what it tells, as if cells lay about it by what they
     # were found to.
-    spread = np.median(np.abs(offs - smooth_offs)[telling], 0) * 1.48 + 1e-9
+    spread = np.median(np.abs(offs - smooth_offs)[cells.telling], 0) * 1.48 + 1e-9
     prior = np.diag(1 / spread**2)
     own = np.linalg.solve(
         information + prior,
         np.einsum("mij,mj->mi", information, offs)[:, :, None] + (smooth_offs @ prior)[:, :, None],
     )[:, :, 0]
-    surely = np.where(telling, share / np.maximum(misfit, 1e-3) ** 2, 0)
-    level = _told(placed.points, levels, surely[:, None] * np.ones(3), middle, spacing)
-    contrast = _told(placed.points, contrasts, surely[:, None] * variance, np.ones(3), spacing)
-    level_at, contrast_at = level.at(placed.points), np.clip(contrast.at(placed.points), 0.25, 4)
-    told_at = np.argwhere(inside > 0)
-    told_at = told_at[:: max(1, len(told_at) // _TOLD)].T
+    levels, contrasts, few = cells.lit(placed.points, spacing, colours[:, *told_at])
     shown = seen[:, *told_at]
-    # In the light of the field, not in its own: what an object's colour differs by is its own.
-    few = ((colours[:, *told_at] - level_at[:, None]) / contrast_at[:, None] + middle).astype(np.float32)
+    telling = np.flatnonzero(cells.telling)
+    widths, _ = _widths(few, shown, at, kinds, telling, together=together)
     return Survey(
         placed.points,
-        share,
+        cells.share,
         few,
         shown,
+        kinds,
         at,
-        _widths(few, shown, at, np.flatnonzero(telling), together=basis is None),
+        widths,
         float(np.hypot(*spread)) / spacing,
-        level_at,
-        contrast_at,
+        levels,
+        contrasts,
         smooth_offs,
         own,
-        plane_moves[:, :2, :2],
+        grid.moves[:, :2, :2],
     )
 
 
-def _widths(lit: Floats, shown: Mask, at: Array, telling: NDArray, *, together: bool) -> Array:
-    """The widths [2] under which the cells near each tell best what it shows, left out itself."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Grid:
+    """The places [side, side, 2] that the reference's cell is read at, which lie `inside` it, `step` [2] apart.
+
+    `moves` [M, 3, 3] lay it on each cell, where that is `usable` [M]; cells are off by `most_off` at most.
+    """
+
+    places: Array
+    inside: Mask
+    step: Array
+    moves: Array
+    usable: Mask
+    most_off: float
+
+    @classmethod
+    def of(cls, placed: Placed, reference: int) -> "_Grid":
+        corners = polygons(chart_of(placed.pattern), placed.index[reference : reference + 1])[0]
+        low, high = corners.min(0), corners.max(0)
+        side = int(np.clip(np.sqrt(_SAMPLES / len(placed.points)), *_SIDES))
+        along = (np.arange(side) + 0.5) / side
+        places = np.stack(
+            np.meshgrid(low[0] + along * (high[0] - low[0]), low[1] + along * (high[1] - low[1])), -1
+        )
+        inside = np.zeros((side, side), np.uint8)
+        on_grid = (corners - low) / (high - low) * side - 0.5
+        cv2.fillPoly(inside, [np.rint(on_grid * 16).astype(np.int32)], 1, shift=4)
+        plane_moves = moves(placed, reference)
+        usable = np.isfinite(plane_moves).all((1, 2))
+        plane_moves[~usable] = 0
+        most_off = _MOST_OFF * float((high - low).min())
+        return cls(places, inside > 0, (high - low) / side, plane_moves, np.asarray(usable), most_off)
+
+    def read(self, pixels: Floats, known: Mask, placed: Placed, offs: Array | None) -> tuple[Floats, Mask]:
+        """The colours [M, side, side, 3] of all cells, off by `offs` [M, 2], and what is seen of them."""
+        points = self.places[None] if offs is None else self.places[None] + offs[:, None, None]
+        points = np.matmul(points, self.moves[:, None, :2, :2].transpose(0, 1, 3, 2))
+        points = points + self.moves[:, None, None, :2, 2]
+        at, ahead = project(placed.image_from_plane, points)
+        spacing = np.maximum(*(np.linalg.norm(np.gradient(at, axis=axis), axis=-1) for axis in (1, 2)))
+        count, side = len(self.moves), len(self.inside)
+        flat = (count * side, side)
+        found = sampled(
+            pixels, known, at.reshape(*flat, 2), ahead.reshape(flat), spacing.reshape(flat),
+            box=Box(0, 1, 0, 1), side=side,
+        )  # fmt: skip
+        seen = found.seen.reshape(count, side, side) & self.inside & self.usable[:, None, None]
+        return found.values.transpose(1, 2, 0).reshape(count, side, side, 3), seen
+
+    def slopes(self, commons: Floats) -> tuple[Floats, Floats]:
+        """The slopes along x and y of common cells [N, side, side, 3]."""
+        x, y = (np.gradient(commons, axis=axis) / width for axis, width in ((2, self.step[0]), (1, self.step[1])))
+        return x.astype(np.float32), y.astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cells:
+    """All cells beside the common one of their kind, of `commons` [N, side, side, 3]: `share` [M] is seen.
+
+    `levels`, `contrasts` [M, 3] are the light of each, which its `variance` [M, 3] tells, `misfit` [M] what
+    is left; `middle` [3] is the mean of the common cells.
+    """
+
+    commons: Floats
+    kinds: NDArray[np.int64]
+    share: Array
+    levels: Array
+    contrasts: Array
+    variance: Array
+    misfit: Array
+    middle: Array
+
+    @property
+    def telling(self) -> Mask:
+        """Which cells are seen enough to tell of their light and place."""
+        return self.share >= _LEAST_SEEN
+
+    def residual(self, colours: Floats, seen: Mask) -> Floats:
+        """What each cell lacks of the common one in its own light, [M, side, side, 3]; 0 where unseen."""
+        light = self.contrasts.astype(np.float32)[:, None, None], self.levels.astype(np.float32)[:, None, None]
+        lit = (colours - light[1]) / light[0] + self.middle.astype(np.float32)
+        return (self.commons[self.kinds] - lit) * seen[..., None]
+
+    def lit(self, places: Array, spacing: float, colours: Floats) -> tuple[Array, Array, Floats]:
+        """The light as a field: levels, contrasts [M, 3] at the `places`, and colours [M, P, 3] lit alike.
+
+        By the field, not each by its own light: what an object's colour differs by is its own.
+        """
+        surely = np.where(self.telling, self.share / np.maximum(self.misfit, 1e-3) ** 2, 0)
+        level = _told(places, self.levels, surely[:, None] * np.ones(3), self.middle, spacing)
+        contrast = _told(places, self.contrasts, surely[:, None] * self.variance, np.ones(3), spacing)
+        levels, contrasts = level.at(places), np.clip(contrast.at(places), 0.25, 4)
+        few = (colours - levels[:, None]) / contrasts[:, None] + self.middle
+        return levels, contrasts, few.astype(np.float32)
+
+
+def _side_by_side(colours: Floats, seen: Mask, inside: Mask, kinds: NDArray[np.int64]) -> _Cells | None:
+    """The cells beside the common one of their kind; None where too few are seen."""
+    share = seen.sum((1, 2)) / max(int(inside.sum()), 1)
+    telling = share >= _LEAST_SEEN
+    if telling.sum() < _FEWEST:
+        return None
+    weights = seen.astype(np.float32)
+    many = np.bincount(kinds[telling], minlength=int(kinds.max()) + 1) / telling.sum()
+    light = None
+    commons, middle = _commons(colours, seen, share, kinds, None), np.zeros(3)
+    for last in (False, False, True):
+        middle = (many @ commons[:, inside].mean(1)).astype(float)
+        light = _light(colours, weights, commons[kinds], middle)
+        if not last:
+            commons = _commons(colours, seen, share, kinds, (light[0], light[1], middle))
+    assert light is not None
+    cells = _Cells(commons, kinds, share, *light, np.zeros(0), middle)
+    misfit = np.abs(cells.residual(colours, seen)).sum((1, 2, 3)) / np.maximum(3 * weights.sum((1, 2)), 1)
+    return replace(cells, misfit=misfit)
+
+
+def _kinds(
+    placed: Placed, lit: Floats, shown: Mask, at: Array, telling: NDArray[np.int64], *, together: bool
+) -> NDArray[np.int64]:
+    """The kinds [M] of the cells, where those of one kind near a cell tell it better than all near it do."""
+    one = np.zeros(len(lit), np.int64)
+    kinds = kinds_of(placed.index, lit[:, ::2], shown[:, ::2], telling, turns=turns_of(placed))
+    if not kinds.any():
+        return one
+    off = [_widths(lit, shown, at, each, telling, together=together)[1] for each in (one, kinds)]
+    return kinds if off[1] < off[0] else one
+
+
+def _widths(
+    lit: Floats, shown: Mask, at: Array, kinds: NDArray[np.int64], telling: NDArray, *, together: bool
+) -> tuple[Array, float]:
+    """The widths [2] under which the cells of its kind near each tell best what it shows, left out itself.
+
+    And what they are off by then.
+    """
     telling = telling[np.linspace(0, len(telling) - 1, min(len(telling), _JUDGED)).astype(int)]
-    lit, shown = lit[telling, ::2], shown[telling, ::2]
+    lit, shown, kinds = lit[telling, ::2], shown[telling, ::2], kinds[telling]
+    alike = _of_one_kind(kinds[:, None], kinds[None])
     squares = (at[telling][:, None] - at[telling][None]) ** 2
     tried = [(i, j) for i in _WIDTHS for j in _WIDTHS if i == j or not together]
     wrong = []
     for widths in tried:
-        near = np.exp(-0.5 * (squares / np.square(widths)).sum(2)).astype(np.float32)
+        near = np.exp(-0.5 * (squares / np.square(widths)).sum(2)).astype(np.float32) * alike
         np.fill_diagonal(near, 0)
         off = np.abs(_mean_of(lit, shown, near) - lit).mean(2)
         wrong.append(float(off[shown].mean()))
-    return np.array(tried[int(np.argmin(wrong))])
+    best = int(np.argmin(wrong))
+    return np.array(tried[best]), wrong[best]
+
+
+def _of_one_kind(kinds: NDArray[np.int64], others: NDArray[np.int64]) -> Floats:
+    """How much cells tell of each other: those of another kind only what none of the same does."""
+    return np.where(kinds == others, np.float32(1), np.float32(_OTHER_KIND))
 
 
 def _mean_of(lit: Floats, shown: Mask, near: Floats) -> Floats:
@@ -237,35 +348,57 @@ def _spacing(points: Array, number: int) -> float:
     return float(others.min()) if len(others) else 1.0
 
 
-def _common(colours: Floats, seen: Mask, share: Array, light: tuple[Array, Array, Array] | None) -> Floats:
-    """The median [side, side, 3] of the cells that are seen best, in one light."""
-    best = np.argsort(-share, kind="stable")[:_MOST_COMMON]
-    best = best[share[best] >= min(_LEAST_SEEN, float(share[best[0]]))]
-    values = colours[best].astype(np.float32)
-    if light is not None:
-        levels, contrasts, middle = light
-        values = (values - levels[best][:, None, None]) / contrasts[best][:, None, None] + middle
-    values = np.ma.masked_array(values, np.repeat(~seen[best][..., None], 3, axis=3))
-    found = np.ma.median(values, axis=0)
-    mean = np.ma.mean(found, axis=(0, 1)).filled(0.5)
-    return np.where(np.ma.getmaskarray(found), mean, found.filled(0)).astype(np.float32)
+def _commons(
+    colours: Floats,
+    seen: Mask,
+    share: Array,
+    kinds: NDArray[np.int64],
+    light: tuple[Array, Array, Array] | None,
+) -> Floats:
+    """The medians [N, side, side, 3] of each kind's cells that are seen best, in one light.
+
+    A place that no cell of a kind shows has the mean of those that are shown, a kind without cells all cells'.
+    """
+    result = np.zeros((int(kinds.max()) + 1, *colours.shape[1:]), np.float32)
+    for kind in range(len(result)):
+        own = np.flatnonzero((kinds == kind) & (share >= _LEAST_SEEN))
+        own = own if len(own) else np.flatnonzero(share >= _LEAST_SEEN)
+        best = own[np.argsort(-share[own], kind="stable")[:_MOST_COMMON]]
+        values = colours[best].astype(np.float32)
+        if light is not None:
+            levels, contrasts, middle = (part.astype(np.float32) for part in light)
+            values = (values - levels[best][:, None, None]) / contrasts[best][:, None, None] + middle
+        values[~seen[best]] = np.nan
+        some = seen[best].any(0)
+        found = np.zeros(colours.shape[1:], np.float32)
+        found[some] = np.nanmedian(values[:, some], axis=0)
+        found[~some] = found[some].mean(0) if some.any() else 0.5
+        result[kind] = found
+    return result
 
 
-def _light(colours: Floats, weights: Floats, common: Floats) -> tuple[Array, Array, Array]:
-    """The level and contrast [M, 3] of cells against the common one, and the variance that tells of it."""
+def _light(colours: Floats, weights: Floats, commons: Floats, middle: Array) -> tuple[Array, Array, Array]:
+    """The level and contrast [M, 3] of cells against common ones [M, side, side, 3], and the variance that tells.
+
+    The level is what a cell has where the common ones have their `middle` [3].
+    """
     inside = weights[..., None] / np.maximum(weights.sum((1, 2)), 1)[:, None, None, None]
-    mean, wanted = (inside * colours).sum((1, 2)), (inside * common).sum((1, 2))
-    around = common - wanted[:, None, None]
+    mean, wanted = (inside * colours).sum((1, 2)), (inside * commons).sum((1, 2))
+    around = commons - wanted[:, None, None]
     variance = (inside * around**2).sum((1, 2))
     together = (inside * around * (colours - mean[:, None, None])).sum((1, 2))
     contrast = np.clip((together + _PRIOR_VARIANCE) / (variance + _PRIOR_VARIANCE), 0.25, 4)
-    # What is seen of a cell has a mean of its own: the level is where the common cell's middle would lie.
-    whole = common.mean((0, 1))
-    return (mean + contrast * (whole - wanted)).astype(float), contrast.astype(float), variance.astype(float)
+    return (mean + contrast * (middle - wanted)).astype(float), contrast.astype(float), variance.astype(float)
 
 
-def _steps(slopes: list[NDArray], residual: NDArray, weights: NDArray) -> tuple[Array, Array]:
-    """The step [M, 2] of each cell's place that lessens its residual [M, side, side, 3]; its information."""
+def _steps(
+    slopes: tuple[Floats, Floats], kinds: NDArray[np.int64], residual: NDArray, weights: NDArray
+) -> tuple[Array, Array]:
+    """The step [M, 2] of each cell's place that lessens its residual [M, side, side, 3]; its information.
+
+    `slopes` are those of the common cell of each kind, [N, side, side, 3] along x and along y.
+    """
+    slopes = (slopes[0][kinds], slopes[1][kinds])
     robust = weights[..., None] / (np.abs(residual) + _ROBUST)
     normal = np.array([[(robust * one * other).sum((1, 2, 3)) for other in slopes] for one in slopes])
     normal = normal.transpose(2, 0, 1).astype(float)
