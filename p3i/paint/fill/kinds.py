@@ -31,8 +31,8 @@ def kinds_of(
 ) -> Numbers:
     """The kind of each cell, numbers from 0 on, [M]: all 0 where there is but one.
 
-    `lit` [M, P, 3] are the cells in one light; those `asked` [K] tell. `turns` are steps (i, j) that lead back
-    to where they start.
+    `lit` [M, P, 3] are the cells in one light; those `asked` [K] tell. `turns` are steps (i, j) that lead
+    back to where they start.
     """
     best = np.zeros(len(index), np.int64)
     if len(asked) < 2:
@@ -47,7 +47,11 @@ def kinds_of(
         and _repeated(index[asked], period)
     ]
     for count in range(2, _MOST_KINDS + 1):
-        judged = [(_left_out(lit[asked], shown[asked], kinds[asked]), kinds) for many, kinds in tried if many == count]
+        judged = [
+            (_left_out(lit[asked], shown[asked], kinds[asked]), kinds)
+            for many, kinds in tried
+            if many == count
+        ]
         if not judged:
             continue
         off, kinds = min(judged, key=lambda one: float(one[0].sum()))
@@ -71,7 +75,7 @@ def turns_of(placed: Placed) -> list[tuple[int, int]]:
 
 
 def _periods(count: int) -> Iterator[Period]:
-    """The sublattices that split the indices into `count` kinds, in Hermite's form: rows (a, b) and (0, c)."""
+    """The sublattices that make `count` kinds of the indices, in Hermite's form: rows (a, b) and (0, c)."""
     for a in range(1, count + 1):
         if count % a == 0:
             for b in range(count // a):
@@ -108,7 +112,10 @@ def _left_out(lit: Floats, shown: Mask, kinds: Numbers) -> NDArray[np.float64]:
         own = np.flatnonzero(kinds == kind)
         others, seen = values[own].sum(0) - values[own], shown[own].sum(0) - shown[own].astype(int)
         rest, left = total - values[own], count - shown[own].astype(int)
-        mean = np.where((seen > 0)[..., None], others, rest) / np.maximum(np.where(seen > 0, seen, left), 1)[..., None]
+        mean = (
+            np.where((seen > 0)[..., None], others, rest)
+            / np.maximum(np.where(seen > 0, seen, left), 1)[..., None]
+        )
         apart = np.abs(mean - lit[own]).mean(2) * shown[own]
         off[own] = apart.sum(1) / np.maximum(shown[own].sum(1), 1)
     return off

@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.paint.fill.sources import Ground, Source
+from p3i.paint.fill.ground import Ground
+from p3i.paint.fill.sources import Source
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.paint.fill.ground import DEEPEST_PX, Ground
 from p3i.paint.fill.light import matched_light
 from p3i.paint.fill.matching import aligned
 from p3i.paint.fill.survey import Survey
@@ -46,8 +47,6 @@ _TRIED_FINELY = 24
 _GROUND = 0.75
 _LEAST_ON_GROUND = 0.6
 _PROBES = 256
-# Sources fade in over so many pixels at most where known ground ends.
-_DEEPEST = 32.0
 # Shifts reach this far, in distances to the next object.
 _MOST_SHIFT = 0.12
 
@@ -73,33 +72,6 @@ class Hole:
     def share(self) -> float:
         """How much what lies around counts beside what all cells tell: half where a tenth of it is known."""
         return _beside_all_cells(self.surrounded)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ground:
-    """A photo with its hole as a place to take colours from: `pixels` [H, W, 3], `sure` float [H, W].
-
-    `inwards` [H, W] is how many pixels each lies inside what is sure, at most `_DEEPEST`.
-    """
-
-    pixels: Floats
-    sure: Floats
-    inwards: Floats
-
-    @classmethod
-    def of(cls, pixels: Floats, known: Mask) -> "Ground":
-        """What is known, and one pixel away from what is not, since samples mix neighbours."""
-        padded = np.pad(known.astype(np.uint8), 1)
-        sure = cv2.erode(padded, np.ones((3, 3), np.uint8))
-        inwards = np.minimum(cv2.distanceTransform(sure, cv2.DIST_L2, 3), _DEEPEST)[1:-1, 1:-1]
-        return cls(pixels, sure[1:-1, 1:-1].astype(np.float32), np.ascontiguousarray(inwards, np.float32))
-
-    def known(self, points: Array) -> Mask:
-        """Which of the points [L, 2] can be read."""
-        height, width = self.sure.shape
-        x, y = points[:, 0], points[:, 1]
-        inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
-        return inside & (taken(self.sure, points) > 0.99)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +121,7 @@ class Source:
             return np.asarray(cv2.warpPerspective(plane, matrix, size, flags=flags, borderMode=border))
 
         known = read(ground.inwards, cv2.INTER_LINEAR, cv2.BORDER_CONSTANT).astype(np.float32)
-        np.minimum(known / np.float32(max(1.0, min(fading_px, _DEEPEST))), 1, out=known)
+        np.minimum(known / np.float32(max(1.0, min(fading_px, DEEPEST_PX))), 1, out=known)
         if drawn is not None:
             known *= read(drawn, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT)
         if not known.any():
@@ -328,7 +300,9 @@ def _on_one_scale(tried: list[_Tried]) -> list[_Tried]:
     both = [one for one in tried if one.share > 0 and np.isfinite(one.expected)]
     if not both:
         return tried
-    scale = float(np.median([one.around for one in both]) / max(np.median([one.expected for one in both]), 1e-6))
+    scale = float(
+        np.median([one.around for one in both]) / max(np.median([one.expected for one in both]), 1e-6)
+    )
     return [replace(one, expected=scale * one.expected) for one in tried]
 
 

@@ -17,11 +17,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.paint.fill.ground import Ground
 from p3i.paint.fill.light import membrane, rim_of
 from p3i.paint.fill.matching import trusted
 from p3i.paint.fill.mixing import feathered, painted
 from p3i.paint.fill.pieces import Piece, drawn_on, padded, pieces_of
-from p3i.paint.fill.sources import MOST_TRIED, Ground, Hole, Source, hole_of, shown_elsewhere, sources
+from p3i.paint.fill.sources import MOST_TRIED, Hole, Source, hole_of, shown_elsewhere, sources
 from p3i.paint.fill.survey import Survey, survey_of
 from p3i.place.moves import nearest_px, pitch_px
 from p3i.place.placed import Placed

@@ -1,20 +1,21 @@
 """All cells of a photo side by side: what they share, and how light and place change smoothly over the photo.
 
-Each cell is read on one grid, by the program's own moves. The common cell is their median; each cell tells
-its light against it (a level and a contrast for each channel) and how far the program is off there. Both
-are smooth over the photo, so that cells which show nothing of themselves have them too, told by all that do.
+Each cell is read on one grid, by the program's own moves. Against the common cell of its kind (kinds.py) each
+tells its light (beside.py) and how far the program is off there. Both are smooth over the photo, so that
+cells which show nothing of themselves have them too, told by all that do.
 
 Convention: program units on the plane of one cell, the `reference`; colours RGB in 0..1; M objects, G
 places of the grid.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.paint.fill.field import Field, field_of
+from p3i.paint.fill.beside import FEWEST, LEAST_SEEN, side_by_side
+from p3i.paint.fill.field import field_of
 from p3i.paint.fill.kinds import kinds_of, turns_of
 from p3i.place.moves import moves
 from p3i.place.outlines import chart_of, polygons
@@ -28,20 +29,11 @@ Mask = NDArray[np.bool_]
 # Samples along the side of the grid, and so many in all.
 _SIDES = (10, 28)
 _SAMPLES = 1_500_000
-# Cells are surveyed from so many on; the common cell is the median of so many at most.
-_FEWEST = 3
-_MOST_COMMON = 150
-# A cell tells of its light and place where this share of it is seen.
-_LEAST_SEEN = 0.25
 # So many places of a cell tell how alike cells are, and so many cells over which widths, in steps, they are.
 _TOLD, _JUDGED = 200, 200
 _WIDTHS = (0.6, 1.2, 2.4, 5.0, 20.0)
 # Cells of another kind count so little beside those of the same.
 _OTHER_KIND = 1e-4
-# Light does not change within so many steps: what does is the objects' own colour.
-_LIGHT = 3.0
-# Contrast is drawn towards 1 as if by this variance: flat cells say nothing of it.
-_PRIOR_VARIANCE = 1e-3
 # Residuals of this size count half in finding a place; neighbouring samples tell the same: one in so many
 # counts.
 _ROBUST = 0.02
@@ -95,7 +87,7 @@ class Survey:
         expected[own] = self.lit[target, own]
         off = np.abs(self.lit - expected).mean(2) * self.shown
         found = off.sum(1) / np.maximum(self.shown.sum(1), 1)
-        return np.where(self.seen >= _LEAST_SEEN, found, np.inf)
+        return np.where(self.seen >= LEAST_SEEN, found, np.inf)
 
     def light(self, target: int, source: int) -> tuple[Array, Array]:
         """The gain and offset [3] that bring a source's colours into the light of the target."""
@@ -106,7 +98,7 @@ class Survey:
 def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     """The survey of what is known of a photo [H, W, 3]; None with too few objects."""
     at_px, front = placed.centers_px()
-    if int((front & placed.in_sight()).sum()) < _FEWEST:
+    if int((front & placed.in_sight()).sum()) < FEWEST:
         return None
     reference = int(
         np.argmin(np.where(placed.in_sight(), np.hypot(*(at_px - np.median(at_px[front], 0)).T), np.inf))
@@ -121,7 +113,7 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
 
     colours, seen = grid.read(pixels, known, placed, None)
     kinds = np.zeros(len(placed.points), np.int64)
-    cells = _side_by_side(colours, seen, grid.inside, kinds)
+    cells = side_by_side(colours, seen, grid.inside, kinds)
     if cells is None:
         return None
     _, _, few = cells.lit(placed.points, spacing, colours[:, *told_at])
@@ -134,7 +126,7 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
         if turn:
             colours, seen = grid.read(pixels, known, placed, offs)
         if turn or kinds.any():
-            cells = _side_by_side(colours, seen, grid.inside, kinds)
+            cells = side_by_side(colours, seen, grid.inside, kinds)
             if cells is None:
                 return None
         steps, information = _steps(
@@ -175,7 +167,7 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Grid:
-    """The places [side, side, 2] that the reference's cell is read at, which lie `inside` it, `step` [2] apart.
+    """The `places` [side, side, 2] read of the reference's cell, which lie `inside` it, `step` [2] apart.
 
     `moves` [M, 3, 3] lay it on each cell, where that is `usable` [M]; cells are off by `most_off` at most.
     """
@@ -223,70 +215,10 @@ class _Grid:
 
     def slopes(self, commons: Floats) -> tuple[Floats, Floats]:
         """The slopes along x and y of common cells [N, side, side, 3]."""
-        x, y = (np.gradient(commons, axis=axis) / width for axis, width in ((2, self.step[0]), (1, self.step[1])))
+        x, y = (
+            np.gradient(commons, axis=axis) / width for axis, width in ((2, self.step[0]), (1, self.step[1]))
+        )
         return x.astype(np.float32), y.astype(np.float32)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Cells:
-    """All cells beside the common one of their kind, of `commons` [N, side, side, 3]: `share` [M] is seen.
-
-    `levels`, `contrasts` [M, 3] are the light of each, which its `variance` [M, 3] tells, `misfit` [M] what
-    is left; `middle` [3] is the mean of the common cells.
-    """
-
-    commons: Floats
-    kinds: NDArray[np.int64]
-    share: Array
-    levels: Array
-    contrasts: Array
-    variance: Array
-    misfit: Array
-    middle: Array
-
-    @property
-    def telling(self) -> Mask:
-        """Which cells are seen enough to tell of their light and place."""
-        return self.share >= _LEAST_SEEN
-
-    def residual(self, colours: Floats, seen: Mask) -> Floats:
-        """What each cell lacks of the common one in its own light, [M, side, side, 3]; 0 where unseen."""
-        light = self.contrasts.astype(np.float32)[:, None, None], self.levels.astype(np.float32)[:, None, None]
-        lit = (colours - light[1]) / light[0] + self.middle.astype(np.float32)
-        return (self.commons[self.kinds] - lit) * seen[..., None]
-
-    def lit(self, places: Array, spacing: float, colours: Floats) -> tuple[Array, Array, Floats]:
-        """The light as a field: levels, contrasts [M, 3] at the `places`, and colours [M, P, 3] lit alike.
-
-        By the field, not each by its own light: what an object's colour differs by is its own.
-        """
-        surely = np.where(self.telling, self.share / np.maximum(self.misfit, 1e-3) ** 2, 0)
-        level = _told(places, self.levels, surely[:, None] * np.ones(3), self.middle, spacing)
-        contrast = _told(places, self.contrasts, surely[:, None] * self.variance, np.ones(3), spacing)
-        levels, contrasts = level.at(places), np.clip(contrast.at(places), 0.25, 4)
-        few = (colours - levels[:, None]) / contrasts[:, None] + self.middle
-        return levels, contrasts, few.astype(np.float32)
-
-
-def _side_by_side(colours: Floats, seen: Mask, inside: Mask, kinds: NDArray[np.int64]) -> _Cells | None:
-    """The cells beside the common one of their kind; None where too few are seen."""
-    share = seen.sum((1, 2)) / max(int(inside.sum()), 1)
-    telling = share >= _LEAST_SEEN
-    if telling.sum() < _FEWEST:
-        return None
-    weights = seen.astype(np.float32)
-    many = np.bincount(kinds[telling], minlength=int(kinds.max()) + 1) / telling.sum()
-    light = None
-    commons, middle = _commons(colours, seen, share, kinds, None), np.zeros(3)
-    for last in (False, False, True):
-        middle = (many @ commons[:, inside].mean(1)).astype(float)
-        light = _light(colours, weights, commons[kinds], middle)
-        if not last:
-            commons = _commons(colours, seen, share, kinds, (light[0], light[1], middle))
-    assert light is not None
-    cells = _Cells(commons, kinds, share, *light, np.zeros(0), middle)
-    misfit = np.abs(cells.residual(colours, seen)).sum((1, 2, 3)) / np.maximum(3 * weights.sum((1, 2)), 1)
-    return replace(cells, misfit=misfit)
 
 
 def _kinds(
@@ -337,58 +269,10 @@ def _mean_of(lit: Floats, shown: Mask, near: Floats) -> Floats:
     return (total.reshape(len(near), -1, 3) / np.maximum(weight, 1e-9)[..., None]).astype(np.float32)
 
 
-def _told(places: Array, values: Array, surely: Array, towards: Array, spacing: float) -> Field:
-    information = surely[:, :, None] * np.eye(values.shape[1])
-    return field_of(places, values, information, towards=towards, spacing=spacing, finest=_LIGHT)
-
-
 def _spacing(points: Array, number: int) -> float:
     apart = np.hypot(*(points - points[number]).T)
     others = apart[apart > 1e-6]
     return float(others.min()) if len(others) else 1.0
-
-
-def _commons(
-    colours: Floats,
-    seen: Mask,
-    share: Array,
-    kinds: NDArray[np.int64],
-    light: tuple[Array, Array, Array] | None,
-) -> Floats:
-    """The medians [N, side, side, 3] of each kind's cells that are seen best, in one light.
-
-    A place that no cell of a kind shows has the mean of those that are shown, a kind without cells all cells'.
-    """
-    result = np.zeros((int(kinds.max()) + 1, *colours.shape[1:]), np.float32)
-    for kind in range(len(result)):
-        own = np.flatnonzero((kinds == kind) & (share >= _LEAST_SEEN))
-        own = own if len(own) else np.flatnonzero(share >= _LEAST_SEEN)
-        best = own[np.argsort(-share[own], kind="stable")[:_MOST_COMMON]]
-        values = colours[best].astype(np.float32)
-        if light is not None:
-            levels, contrasts, middle = (part.astype(np.float32) for part in light)
-            values = (values - levels[best][:, None, None]) / contrasts[best][:, None, None] + middle
-        values[~seen[best]] = np.nan
-        some = seen[best].any(0)
-        found = np.zeros(colours.shape[1:], np.float32)
-        found[some] = np.nanmedian(values[:, some], axis=0)
-        found[~some] = found[some].mean(0) if some.any() else 0.5
-        result[kind] = found
-    return result
-
-
-def _light(colours: Floats, weights: Floats, commons: Floats, middle: Array) -> tuple[Array, Array, Array]:
-    """The level and contrast [M, 3] of cells against common ones [M, side, side, 3], and the variance that tells.
-
-    The level is what a cell has where the common ones have their `middle` [3].
-    """
-    inside = weights[..., None] / np.maximum(weights.sum((1, 2)), 1)[:, None, None, None]
-    mean, wanted = (inside * colours).sum((1, 2)), (inside * commons).sum((1, 2))
-    around = commons - wanted[:, None, None]
-    variance = (inside * around**2).sum((1, 2))
-    together = (inside * around * (colours - mean[:, None, None])).sum((1, 2))
-    contrast = np.clip((together + _PRIOR_VARIANCE) / (variance + _PRIOR_VARIANCE), 0.25, 4)
-    return (mean + contrast * (middle - wanted)).astype(float), contrast.astype(float), variance.astype(float)
 
 
 def _steps(
