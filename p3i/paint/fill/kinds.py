@@ -22,6 +22,8 @@ Period = tuple[int, int, int]
 # Kinds in turn that are tried, and the finds that photos of one kind of cell would show.
 _MOST_KINDS = 6
 _FALSE_ALARMS = 0.05
+# So many cells tell whether a period is repeated.
+_MOST_ASKED = 400
 # A loop closes where so many steps come back to within this share of a step.
 _MOST_STEPS, _CLOSED = 720, 0.25
 
@@ -38,14 +40,7 @@ def kinds_of(
     if len(asked) < 2:
         return best
     wrong = _left_out(lit[asked], shown[asked], best[asked])
-    tried = [
-        (count, kinds)
-        for count in range(2, _MOST_KINDS + 1)
-        for period in _periods(count)
-        if all(_kinds(np.array([turn]), period)[0] == 0 for turn in turns)
-        and len(np.unique((kinds := _kinds(index, period))[asked])) == count
-        and _repeated(index[asked], period)
-    ]
+    tried = _partitions(index, asked, turns)
     for count in range(2, _MOST_KINDS + 1):
         judged = [
             (_left_out(lit[asked], shown[asked], kinds[asked]), kinds)
@@ -59,6 +54,22 @@ def kinds_of(
         if off.sum() < wrong.sum() and len(tried) * _by_chance(better, better + worse) < _FALSE_ALARMS:
             best, wrong = kinds, off
     return best
+
+
+def _partitions(
+    index: Numbers, asked: Numbers, turns: Sequence[tuple[int, int]]
+) -> list[tuple[int, Numbers]]:
+    """The ways to split cells by a period, each once: how many kinds it makes, and the kinds [M]."""
+    found: dict[bytes, tuple[int, Numbers]] = {}
+    for count in range(2, _MOST_KINDS + 1):
+        for period in _periods(count):
+            kinds = _kinds(index, period)
+            _, first, numbers = np.unique(kinds[asked], return_index=True, return_inverse=True)
+            closed = all(_kinds(np.array([turn]), period)[0] == 0 for turn in turns)
+            if closed and len(first) == count and _repeated(index[asked], kinds[asked], period):
+                # Told apart by the order in which kinds come, since their numbers may be any.
+                found.setdefault(np.argsort(np.argsort(first))[numbers.reshape(-1)].tobytes(), (count, kinds))
+    return list(found.values())
 
 
 def turns_of(placed: Placed) -> list[tuple[int, int]]:
@@ -88,17 +99,19 @@ def _kinds(index: Numbers, period: Period) -> Numbers:
     return (index[:, 0] - rows * a) * c + (index[:, 1] - rows * b) % c
 
 
-def _repeated(index: Numbers, period: Period) -> bool:
-    """Whether most cells have another one period away along each step: else rows are told, not a period."""
+def _repeated(index: Numbers, kinds: Numbers, period: Period) -> bool:
+    """Whether each kind comes again one period away along each step: else rows are told, not a period."""
     there = set(map(tuple, index.tolist()))
+    a, b, c = period
     varied = (np.ptp(index, axis=0) > 0).tolist()
-    for i, j in [(period[0], period[1])] * varied[0] + [(0, period[2])] * varied[1]:
-        steps = [(i, j - period[2]), (i, j)] if i else [(i, j)]
-        found = [
-            any((a + way * di, b + way * dj) in there for way in (1, -1) for di, dj in steps)
-            for a, b in index.tolist()
-        ]
-        if np.mean(found) <= 0.5:
+    every = range(0, len(index), max(1, len(index) // _MOST_ASKED))
+    for steps in [[(a, b), (a, b - c)]] * varied[0] + [[(0, c)]] * varied[1]:
+        again = {
+            int(kinds[place])
+            for place in every
+            if any((index[place, 0] + i, index[place, 1] + j) in there for i, j in steps)
+        }
+        if len(again) < a * c:
             return False
     return True
 
