@@ -57,7 +57,7 @@ class Cells:
             self.levels.astype(np.float32)[:, None, None],
         )
         lit = (colours - light[1]) / light[0] + self.middle.astype(np.float32)
-        return (self.commons[self.kinds] - lit) * seen[..., None]
+        return np.asarray((self.commons[self.kinds] - lit) * seen[..., None], np.float32)
 
     def lit(self, places: Array, spacing: float, colours: Floats) -> tuple[Array, Array, Floats]:
         """The light as a field: levels, contrasts [M, 3] at the `places`, and colours [M, P, 3] lit alike.
