@@ -85,7 +85,7 @@ class Drawn:
 
     `fit` is of the objects that are drawn. `sure` is what its score is made of (look/contrast.py); on rings
     it may be told at another radius than the objects'. `notes` are for people;
-    `readings` are the places of a lattice's cell that may be its object.
+    `readings` are the places of the cell that may be its object.
     """
 
     program: Program

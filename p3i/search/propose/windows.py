@@ -45,7 +45,7 @@ def straightened_guesses(evidence: Evidence) -> list[Guess]:
         )
         if pair is not None:
             lattice = Lattice(rx_deg, ry_deg, reduce_basis(pair.basis * unit), middle)
-            found.append(lattice_guess(lattice, pair.worth, local=False))
+            found.append(lattice_guess(lattice, pair.bits, local=False))
     return sorted(found, key=lambda guess: -guess.promise)
 
 
@@ -80,7 +80,7 @@ def window_guesses(evidence: Evidence) -> list[Guess]:
             origin = (middle[:2] - np.array(size.middle)) / size.unit_px
             basis = pair.basis / level.unit_px
             lattice = Lattice(0.0, 0.0, reduce_basis(basis), origin)
-            found.append(lattice_guess(lattice, pair.worth, local=True))
+            found.append(lattice_guess(lattice, pair.bits, local=True))
     return sorted(found, key=lambda guess: -guess.promise)
 
 
