@@ -161,7 +161,7 @@ def _by_coset(
 
 
 def _agreement_of_all(groups: list[Cells]) -> float:
-    """The median agreement of the cells of each group with the mean of all the others, the least of all groups.
+    """The median agreement of a group's cells with the mean of all the others, the least of all groups.
 
     Of each group, since where one kind has more cells in sight the mean of all is like it.
     """
