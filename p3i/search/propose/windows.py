@@ -25,7 +25,8 @@ MOST_TILT_DEG = 66.0
 _CHANNELS = 4
 # Shortest and longest shift, in pixels of the canvas.
 _SHIFTS = (4.0, 60.0)
-_WINDOW = 128
+SIDE = 128
+"""The side of a window, in pixels of the fine map."""
 # Parts of a lattice may be shorter than what begins one, down to two pixels, the least that shows a valley.
 _LEAST_PART = 2.0
 
@@ -49,12 +50,12 @@ def straightened_guesses(evidence: Evidence) -> list[Guess]:
     return sorted(found, key=lambda guess: -guess.promise)
 
 
-def window_guesses(evidence: Evidence) -> list[Guess]:
+def window_guesses(evidence: Evidence, *, side: int = SIDE) -> list[Guess]:
     """A guess for each window that shows a lattice, seen straight on, the most promising first."""
     level = evidence.level(FINE, blur=0.5)
     planes = level.values[:_CHANNELS].permute(1, 2, 0).contiguous().numpy()
     known = level.valid.numpy().astype(np.float32)
-    side = min(_WINDOW, *known.shape)
+    side = min(side, *known.shape)
     if side < 32:
         return []
     offset = np.arange(side) - (side - 1) / 2
