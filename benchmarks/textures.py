@@ -9,8 +9,9 @@ bricks, gratings, wallpapers and fences of Debian's packages ufoai-textures and 
 unpacked); backgrounds are any photographs without a pattern (mate-backgrounds has some). Each texture is laid
 out a few times, its tiles mirrored at random where they may be, tilted by 10 to 55 degrees under a focal
 between 26 and 55 mm, lit unevenly, covered in parts, blurred and compressed. With `--small` it
-spans a quarter to a half of the longer side, off the middle, and more lies before it. A camera of 35 mm is assumed by the search, so the pose is compared by its vanishing line, as everywhere in `p3i eval`. Everything follows
-from the seed.
+spans a quarter to a half of the longer side, off the middle, and more lies before it. A camera of 35 mm is
+assumed by the search, so the pose is compared by its vanishing line, as everywhere in `p3i eval`. Everything
+follows from the seed.
 """
 
 import argparse
