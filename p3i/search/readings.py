@@ -73,7 +73,7 @@ def _lattice_on(evidence: Evidence, answer: Answer, reading: Reading) -> Program
     """The program of a lattice with its objects on another place; None where there are none."""
     drawn = compile(answer.program)
     lattice = Lattice.of(drawn, drawn.theta).moved_to(np.array(reading.steps))
-    layout = layout_at(evidence, lattice, drawn.index, readings=())
+    layout = layout_at(evidence, lattice, drawn.index)
     if layout is None:
         return None
     layout = refitted(evidence, layout)
