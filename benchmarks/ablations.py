@@ -139,8 +139,8 @@ def difference_autocorrelation(view: np.ndarray, weights: np.ndarray) -> by_shif
     apart = (both - 2 * correlation(power)) / (2 * np.maximum(overlap, 1e-6 * whole))
     values = np.where(judged, 1 - apart, -1)
     trust = np.sqrt(np.clip(overlap / whole, 0, 1))
-    shifted = np.fft.fftshift
-    return by_shifts.Autocorrelation(shifted(values).astype(np.float32), shifted(judged), shifted(trust))
+    shifted = (np.fft.fftshift(one) for one in (values.astype(np.float32), judged, trust))
+    return by_shifts.Autocorrelation(*shifted, pixels=float(weights.sum()))
 
 
 _BLURRED = evidence._level

@@ -1,6 +1,6 @@
 """Photographed textures on slanted planes before photographs, as annotated sets for `p3i eval`.
 
-python benchmarks/textures.py --textures FOLDER... --backgrounds FOLDER --out SET [--count 81] [--seed 0]
+python benchmarks/textures.py --textures FOLDER... --backgrounds FOLDER --out SET [--small] [--seed 0]
 p3i eval SET/cells                  # textures whose cell is known
 p3i eval SET/poses                  # the others: of their objects only the pose is true
 
@@ -8,9 +8,10 @@ Pictures that nobody tuned to, with an exact truth. The textures are those of TE
 bricks, gratings, wallpapers and fences of Debian's packages ufoai-textures and sweethome3d (their archives
 unpacked); backgrounds are any photographs without a pattern (mate-backgrounds has some). Each texture is laid
 out a few times, its tiles mirrored at random where they may be, tilted by 10 to 55 degrees under a focal
-between 26 and 55 mm, lit unevenly, covered in parts, blurred and compressed. A camera of 35 mm is assumed by
-the search, so the pose is compared by its vanishing line, as everywhere in `p3i eval`. Everything follows
-from the seed.
+between 26 and 55 mm, lit unevenly, covered in parts, blurred and compressed. With `--small` it
+spans a quarter to a half of the longer side, off the middle, and more lies before it. A camera of 35 mm is
+assumed by the search, so the pose is compared by its vanishing line, as everywhere in `p3i eval`. Everything
+follows from the seed.
 """
 
 import argparse
@@ -86,6 +87,22 @@ TEXTURES = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """Where a texture lies: it spans so much and is at most so far `off` the middle, in program units.
+
+    From so many up to so many things, the last not counted, lie before the picture.
+    """
+
+    span: tuple[float, float]
+    off: float
+    covers: tuple[int, int]
+
+
+LARGE = Laid((45, 130), 12, (0, 3))
+SMALL = Laid((24, 50), 25, (2, 6))
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write the set."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -96,6 +113,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True, help="the folder of the set")
     parser.add_argument("--count", type=int, default=81)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--small", action="store_true", help="textures that fill about a tenth of the picture"
+    )
     asked = parser.parse_args(arguments)
     found = {one.stem: one for folder in asked.textures for one in _pictures(folder) if one.stem in TEXTURES}
     backgrounds = _pictures(asked.backgrounds)
@@ -108,7 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for place in range(asked.count):
         name = sorted(found)[place % len(found)]
         background = _read(backgrounds[random.integers(len(backgrounds))])
-        picture, truth = scene(_read(found[name]), TEXTURES[name], background, random)
+        laid = SMALL if asked.small else LARGE
+        picture, truth = scene(_read(found[name]), TEXTURES[name], background, random, laid)
         part, file = "cells" if TEXTURES[name].across else "poses", f"images/{place:03d}_{name}.jpg"
         cv2.imwrite(str(asked.out / part / file), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
         sets[part].append({"file": file, **truth})
@@ -117,7 +138,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def scene(
-    texture: NDArray[np.uint8], told: Texture, background: NDArray[np.uint8], random: np.random.Generator
+    texture: NDArray[np.uint8],
+    told: Texture,
+    background: NDArray[np.uint8],
+    random: np.random.Generator,
+    laid: Laid = LARGE,
 ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     """A picture [H, W, 3] of the texture on a plane before the background, and its annotation."""
     board = _laid_out(texture, told, random)
@@ -125,16 +150,16 @@ def scene(
     tilt, around = math.radians(random.uniform(10, 55)), random.uniform(0, 2 * math.pi)
     normal = (math.sin(tilt) * math.cos(around), math.sin(tilt) * math.sin(around), math.cos(tilt))
     camera = Camera.from_normal(normal, focal_mm=float(random.choice(FOCALS_MM)))
-    units_a_pixel = random.uniform(45, 130) / max(board.shape[:2])
+    units_a_pixel = random.uniform(*laid.span) / max(board.shape[:2])
     turn = math.radians(random.normal(0, 12))
     plane_from_board = np.eye(3)
     plane_from_board[:2, :2] = units_a_pixel * np.array(
         [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
     )
     middle = np.array(board.shape[1::-1]) / 2
-    plane_from_board[:2, 2] = random.uniform(-12, 12, 2) - plane_from_board[:2, :2] @ middle
+    plane_from_board[:2, 2] = random.uniform(-laid.off, laid.off, 2) - plane_from_board[:2, :2] @ middle
     image_from_board = camera.image_from_plane(size).numpy() @ plane_from_board
-    picture = _photographed(board, image_from_board, background, size, random)
+    picture = _photographed(board, image_from_board, background, size, random, laid.covers)
     return picture, _truth(board, told.basis * texture.shape[1::-1], image_from_board, camera, size)
 
 
@@ -151,7 +176,12 @@ def _laid_out(texture: NDArray, told: Texture, random: np.random.Generator) -> N
 
 
 def _photographed(
-    board: NDArray, image_from_board: Array, background: NDArray, size: Size, random: np.random.Generator
+    board: NDArray,
+    image_from_board: Array,
+    background: NDArray,
+    size: Size,
+    random: np.random.Generator,
+    covers: tuple[int, int],
 ) -> NDArray[np.uint8]:
     """The board through the camera: at twice the size, reduced; lit, covered, blurred, with noise."""
     width, height = size.width, size.height
@@ -168,7 +198,7 @@ def _photographed(
     light = random.uniform(0.9, 1.6) * (1 + slope[0] * (x / width - 0.5) + slope[1] * (y / height - 0.5))
     covered = seen(np.ones(board.shape[:2]))[..., None]
     picture = seen(board) * light[..., None] + behind * (1 - covered)
-    for _ in range(random.integers(0, 3)):
+    for _ in range(random.integers(*covers)):
         at, reach = random.uniform(0, 1, 2) * (width, height), random.uniform(0.04, 0.12) * width
         axes, colour = (int(reach), int(0.6 * reach)), random.uniform(20, 220, 3).tolist()
         cv2.ellipse(picture, at.astype(int).tolist(), axes, random.uniform(0, 180), 0, 360, colour, -1)

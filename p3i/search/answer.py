@@ -14,7 +14,7 @@ class Answer:
     (comparable between programs for one photo). `focal_mm` is the focal that the program is told with, None
     where it is the one assumed; then `focal_reason` may say why no other was found. `lens_k1` is the radial
     distortion of the photo that the program holds on (p3i/interp/lens.py), None for a pinhole camera.
-    `readings` are the places of a lattice's cell that may be its object, the likeliest first.
+    `readings` are the places of the cell that may be its object, the likeliest first.
     `others` are the patterns beside this one that were met on the way to it. `covered` is the share of the
     picture that a ring's objects fill. `upright`: these do not turn with it (look/upright.py).
     """

@@ -69,7 +69,7 @@ def looked_closer(session: Session, search: Search) -> tuple[Session, list[Answe
 def promising_part(evidence: Evidence) -> Box | None:
     """The part of half the sides of what is looked at in whose windows most repeats; None where nothing does.
 
-    A window speaks by the square of its worth: one that repeats well says more than two that half do.
+    A window speaks by the bits that its lattice saves.
     """
     part = evidence.part
     proposals = window_guesses(evidence)
@@ -77,7 +77,7 @@ def promising_part(evidence: Evidence) -> Box | None:
         return None
     size = evidence.image.size
     at = np.array([one.lattice.origin for one in proposals]) * size.unit_px + size.middle - part.corner
-    worth = np.array([one.promise for one in proposals]) ** 2
+    worth = np.array([one.promise for one in proposals])
     width, height = math.ceil(part.size.width / 2), math.ceil(part.size.height / 2)
     best: tuple[float, Box] | None = None
     for top in np.linspace(0, part.size.height - height, PLACES).round().astype(int).tolist():

@@ -81,8 +81,9 @@ class SearchConfig:
     ] = "p3i"
     object: Annotated[
         str | None,
-        "Which place of a lattice's cell is its object: where lines cross, the field between them, what is "
-        "dark or light, or the place of this number, as --top lists them. By default the likeliest.",
+        "Which place of the cell is its object: where lines cross, the field between them, what is dark or "
+        "light, or the place of this number (the circle, on a ring), as --top lists them. By default the "
+        "likeliest.",
         Spelt(metavar="|".join((*OBJECTS, "N"))),
     ] = None
     exhaustive_s: Annotated[
@@ -207,8 +208,8 @@ class SearchConfig:
         asked += ["strict"] if self.strict else []
         if asked:
             raise UsageError(f"--{asked[0]} says itself where the objects are: leave out --object")
-        if self.structure in ("circular", "hybrid"):
-            raise UsageError(f"--object chooses in the cell of a lattice: leave it out for {self.structure}")
+        if self.structure == "hybrid" or (self.structure == "circular" and self.object in OBJECTS):
+            raise UsageError(f"--object {self.object} is none of {self.structure} patterns: leave it out")
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -1,7 +1,8 @@
 """Which place of the cell is the object: an answer's other readings as answers, and what is said of them.
 
 The same lattice may have its objects where lines cross or on the fields between, on the dark squares of a
-floor or on the light ones. The likeliest is drawn; the others are told, and `--object` picks one of them.
+floor or on the light ones, and the same ring on one circle or another. The likeliest is drawn; the others are
+told, and `--object` picks one of them.
 """
 
 import itertools
@@ -10,6 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from p3i.grammar.ast import Program
+from p3i.grammar.leaves import leaves, with_leaves
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
@@ -17,6 +20,7 @@ from p3i.search.extent.layout import filling_layout, layout_at, refitted
 from p3i.search.forms.lattice import Lattice
 from p3i.search.judge.bits import explained
 from p3i.search.judge.evaluate import score_of_program
+from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import Reading
 
@@ -26,15 +30,15 @@ _WORTH_NAMING = 0.05
 
 
 def offers(answer: Answer, config: SearchConfig) -> bool:
-    """Whether an answer draws the place of the cell that the options ask for; a ring has no such choice."""
+    """Whether an answer draws the place that the options ask for, or offers no other."""
     return config.object is None or not answer.readings or _is(_drawn(answer), config.object, answer)
 
 
 def reading_notes(answer: Answer, config: SearchConfig) -> tuple[str, ...]:
     """What to say of the place that an answer's objects are on."""
     if config.object is not None:
-        chooses = "--object chooses among the places of a lattice's cell, and this is a"
-        return () if answer.readings else (f"{chooses} {_KINDS.get(answer.structure, answer.structure)}",)
+        kind = _KINDS.get(answer.structure, answer.structure)
+        return () if answer.readings else (f"--object chooses among places, and this {kind} offers one only",)
     reading = _drawn(answer)
     if reading is None or reading.probability >= _SURE:
         return ()
@@ -47,7 +51,7 @@ def reading_notes(answer: Answer, config: SearchConfig) -> tuple[str, ...]:
 
 
 def other_readings(session: Session, answer: Answer, *, most: int) -> list[Answer]:
-    """The same lattice with its objects on other places of its cell, the likeliest first, at most so many.
+    """The same pattern with its objects on other places of its cell, the likeliest first, at most so many.
 
     None for an answer through a lens, whose lattice is one of another picture.
     """
@@ -55,28 +59,47 @@ def other_readings(session: Session, answer: Answer, *, most: int) -> list[Answe
 
 
 def _others(session: Session, answer: Answer) -> Iterator[Answer]:
-    config = session.config
     evidence = session.evidence.under(answer.focal_mm or session.evidence.focal_mm)
-    drawn = compile(answer.program)
+    moved = _lattice_on if answer.structure == "lattice" else _ring_on
     for reading in answer.readings:
-        if reading.drawn:
-            continue
-        lattice = Lattice.of(drawn, drawn.theta).moved_to(np.array(reading.steps))
-        layout = layout_at(evidence, lattice, drawn.index, readings=_seen_from(reading, answer.readings))
-        if layout is None:
-            continue
-        layout = refitted(evidence, layout)
-        if config.extent_used == "image":
-            layout = filling_layout(evidence, layout)
-        other = replace(answer, program=layout.program(), readings=layout.readings, notes=())
-        score = score_of_program(evidence, other.program)
-        yield replace(explained(session.evidence, other), score=score)
+        program = None if reading.drawn else moved(evidence, answer, reading)
+        if program is not None:
+            readings = _seen_from(reading, answer.readings)
+            other = replace(answer, program=program, readings=readings, notes=())
+            yield replace(explained(session.evidence, other), score=score_of_program(evidence, program))
+
+
+def _lattice_on(evidence: Evidence, answer: Answer, reading: Reading) -> Program | None:
+    """The program of a lattice with its objects on another place; None where there are none."""
+    drawn = compile(answer.program)
+    lattice = Lattice.of(drawn, drawn.theta).moved_to(np.array(reading.steps))
+    layout = layout_at(evidence, lattice, drawn.index)
+    if layout is None:
+        return None
+    layout = refitted(evidence, layout)
+    if evidence.config.extent_used == "image":
+        layout = filling_layout(evidence, layout)
+    return layout.program()
+
+
+def _ring_on(_: Evidence, answer: Answer, reading: Reading) -> Program:
+    """The program of a ring with its objects on another circle."""
+    numbers = leaves(answer.program)
+    step = numbers["draw.x.angle.j"]
+    moved: dict[str, float] = {}
+    for side in ("draw.x", "draw.y"):
+        moved[f"{side}.radius.1"] = numbers[f"{side}.radius.1"] * reading.radius
+        moved[f"{side}.angle.1"] = numbers[f"{side}.angle.1"] + reading.steps[1] * step
+    return with_leaves(answer.program, moved)
 
 
 def _seen_from(drawn: Reading, readings: tuple[Reading, ...]) -> tuple[Reading, ...]:
     """The readings as they are told where one of them is drawn."""
     i, j = drawn.steps
-    return tuple(replace(one, steps=(one.steps[0] - i, one.steps[1] - j)) for one in readings)
+    return tuple(
+        replace(one, steps=(one.steps[0] - i, one.steps[1] - j), radius=one.radius / drawn.radius)
+        for one in readings
+    )
 
 
 def _drawn(answer: Answer) -> Reading | None:

@@ -48,7 +48,7 @@ class StopReason(Enum):
     OUT_OF_SIGHT = "no regular pattern: most objects of what was found would lie outside the picture"
     NO_FIT = "the sketch does not fit this photo"
     OUTSIDE_TABLE_1 = "the pattern that was found cannot be written in the paper's Table 1, as strict asks"
-    NO_SUCH_OBJECT = "the cell of the lattice that was found has no such place"
+    NO_SUCH_OBJECT = "the cell of what was found has no such place"
     TOO_SMALL = "the picture is too small to hold a pattern"
     FLAT = "the picture has too little contrast to hold a pattern"
     TOO_LITTLE_KNOWN = "too few pixels of the picture are known (the rest is masked or transparent)"
@@ -56,24 +56,28 @@ class StopReason(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A place of a lattice's cell that may be its object.
+    """A place of a lattice's or a ring's cell that may be its object.
 
     `name` is what is there, `crossing`, `field`, `dark` or `light`, else its rank, from 1; `probability` that
-    it is the object; `steps` how many of i and of j it lies from the objects that are drawn, 0 for these.
+    it is the object; `steps` how many of i and of j it lies from the objects that are drawn, 0 for these;
+    `radius` how many times as far from the centre of a ring.
     """
 
     name: str
     probability: float
     steps: tuple[float, float]
+    radius: float = 1.0
 
     @property
     def drawn(self) -> bool:
         """Whether the program draws this one."""
-        return self.steps == (0.0, 0.0)
+        return self.steps == (0.0, 0.0) and self.radius == 1
 
     @property
     def phrase(self) -> str:
         """What is there, in words that follow "objects on"."""
+        if self.radius != 1:
+            return f"the circle of {self.radius:.2f} times its radius"
         return _PHRASES.get(self.name, f"place {self.name} of the cell")
 
 
@@ -89,8 +93,8 @@ _PHRASES: Mapping[str, str] = {
 class Candidate:
     """One program that the search weighed, with its own focal; the rest as in SynthesisResult.
 
-    `reading` is the place of the cell that a lattice's objects are on, None for others. `same_lattice`: it is
-    the answer's lattice, its objects on another place of the cell.
+    `reading` is the place of the cell that the objects are on, None for others. `same_lattice`: it is
+    the answer's lattice or ring, its objects on another place of the cell.
     """
 
     program: Program
@@ -109,7 +113,8 @@ class Candidate:
     @property
     def title(self) -> str:
         """What it is, for people: "lattice, score 0.3500", "the same lattice, objects on the fields, ..."."""
-        parts = ["the same lattice" if self.same_lattice else self.structure]
+        same = "the same lattice" if self.structure == "lattice" else "the same ring"
+        parts = [same if self.same_lattice else self.structure]
         if self.reading is not None:
             parts.append(f"objects on {self.reading.phrase} ({self.reading.probability:.2f})")
         return ", ".join([*parts, f"score {self.score:.2f}"])
@@ -177,8 +182,8 @@ class SynthesisResult:
     plane's normal; None without a program.
     `mirrored` is the other tilt, (rx, ry) in degrees, that a ring's objects fit about as well, None where the
     two can be told apart.
-    `readings` are the places of a lattice's cell that may be its object, the likeliest first; empty for
-    others. With StopReason.NO_SUCH_OBJECT they are what the cell offers in place of the one asked for.
+    `readings` are the places of the cell that may be its object, the likeliest first; empty where there is no
+    choice. With StopReason.NO_SUCH_OBJECT they are what the cell offers in place of the one asked for.
     `others` are further patterns that the search met beside the answer's, the most worth first: not all that
     there are, which `p3i.synth_all` looks for.
     `window` is the rectangle (x, y, width, height) of photo pixels that was looked at closer: the box of a
@@ -238,7 +243,7 @@ class SynthesisResult:
 
     @property
     def reading(self) -> Reading | None:
-        """The place of a lattice's cell that the objects of `program` are on; None for rings and hybrids."""
+        """The place of the cell that the objects of `program` are on; None where there is no choice."""
         return next((one for one in self.readings if one.drawn and self.program is not None), None)
 
     def record(self, *, image: str | None = None, seconds: float | None = None) -> dict[str, Any]:

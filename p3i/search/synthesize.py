@@ -20,7 +20,6 @@ from p3i.search.fit.best import Best
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.fitting import certain, fit_places, holds, worth
 from p3i.search.fit.same import same_lattice, says_already
-from p3i.search.fit.saved import saved_bits
 from p3i.search.forms.asked import asks_for_itself, check_asked
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.sketches import Sketched, sketches
@@ -196,10 +195,7 @@ def _answers(look: Session) -> list[Answer]:
 
 
 def _finished(look: Session, fit: Fit) -> Answer | None:
-    """A lattice that was fitted, as an answer; None where not even the cells that agree come again."""
-    agreeing = replace(fit, index=fit.index[fit.support], contrast=fit.contrast[fit.support])
-    if saved_bits(look.evidence, agreeing) <= 0:
-        return None
+    """A lattice that was fitted, as an answer; None where no object is seen."""
     sketch = sketches(SearchConfig(structure="lattice"))[0]
     found = drawn(look, sketch, fit, None)
     return None if found is None else answers_of(look, sketch, found)[0]

@@ -124,7 +124,7 @@ def _agreed_cell(
 
 def _trusted(weights: Floats, where: Floats) -> Floats:
     """The weights [N] of cells as far as the pattern is thought to be there, `where` [rows, columns]."""
-    return (weights * (0.1 + 0.9 * where).ravel()).astype(np.float32)
+    return (weights * where.ravel()).astype(np.float32)
 
 
 def _second_kind(

@@ -53,7 +53,7 @@ def sheet_features(sheet: Sheet) -> tuple[Floats, Mask]:
     strength = np.sqrt(xx + yy)
     root = np.maximum(strength, 1e-4) ** 1.5
     gradient = np.stack([np.sqrt(strength), (xx - yy) / root, 2 * xy / root])
-    gradient[0] -= masked_mean(gradient[:1], inner, 2 * sheet.side)[0]
+    gradient -= masked_mean(gradient, inner, 2 * sheet.side)
     offset = colour - masked_mean(colour, seen, 2 * sheet.side)
     groups = [_normalised(group, inner, sheet.side) for group in (gradient, offset)]
     return np.concatenate(groups), inner

@@ -1,15 +1,18 @@
 """Which place of the cell is the object: the default, what else is offered, and how it is asked for."""
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
 import numpy as np
 import pytest
 import torch
+from drawn import DrawnRing
 from truth import lattice_of
 
 from p3i.grammar.ast import Affine as A
 from p3i.grammar.ast import CameraPose, Draw, For, Program
+from p3i.grammar.leaves import leaves
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
@@ -197,13 +200,34 @@ def test_a_sure_choice_and_none_at_all_need_no_note(readings: tuple[Reading, ...
     assert reading_notes(answer(*readings), SearchConfig()) == ()
 
 
-def test_a_ring_says_that_the_option_is_for_lattices() -> None:
-    config = SearchConfig(object="dark")
+def test_a_ring_of_one_circle_says_that_there_is_no_choice() -> None:
+    config = SearchConfig(object="2")
     ring = answer(structure="circular")
     assert offers(ring, config)
-    assert reading_notes(ring, config) == (
-        "--object chooses among the places of a lattice's cell, and this is a ring",
+    (note,) = reading_notes(ring, config)
+    assert note == "--object chooses among places, and this ring offers one only"
+
+
+def test_the_other_circle_of_a_dial_is_told_listed_and_drawn_where_asked_for() -> None:
+    outer, inner = (DrawnRing(radius=radius, size=size, noise=0.0) for radius, size in ((24, 4), (18, 3)))
+    ground, marks = outer.image(), inner.image()
+    drawn = np.abs(marks.pixels - marks.pixels[0, 0]).max(2, keepdims=True) > 0.02
+    dial = replace(ground, pixels=np.where(drawn, marks.pixels, ground.pixels))
+    result = synthesize(dial, SearchConfig(structure="circular", top=2))
+    here, there = result.readings
+    assert here.drawn and there.radius == pytest.approx(24 / 18, abs=0.2)
+    assert any(
+        f"--object 2 draws on the circle of {there.radius:.2f} times its radius" in one
+        for one in result.notes
     )
+    first, second = (leaves(one.program)["draw.x.radius.1"] for one in result.candidates)
+    assert first == pytest.approx(18, abs=1) and second == pytest.approx(first * there.radius, rel=1e-3)
+    assert result.candidates[1].title.startswith("the same ring, objects on place 2 of the cell (")
+    asked = synthesize(dial, SearchConfig(structure="circular", object="2"))
+    assert asked.program is not None and asked.reading is not None and asked.reading.name == "2"
+    assert leaves(asked.program)["draw.x.radius.1"] == pytest.approx(second, rel=0.02)
+    refused = synthesize(dial, SearchConfig(structure="circular", object="3"))
+    assert refused.stop is StopReason.NO_SUCH_OBJECT and "it offers 1, 2" in refused.reason
 
 
 def test_an_answer_offers_what_it_draws_by_name_and_by_rank() -> None:

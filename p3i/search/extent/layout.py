@@ -123,15 +123,13 @@ def _whole(outline: Outline) -> bool:
     return outline.there > (1 - MISSES[0]) * outline.seen
 
 
-def layout_at(
-    evidence: Evidence, lattice: Lattice, ground: Tensor, *, readings: tuple[Reading, ...]
-) -> Layout | None:
-    """The objects of a lattice that lie at its points, one of the `readings`, around cells [N, 2]."""
+def layout_at(evidence: Evidence, lattice: Lattice, ground: Tensor) -> Layout | None:
+    """The objects of a lattice that lie at its points, around cells [N, 2]; None where there are none."""
     cells = _cells(evidence, *_seen(evidence, lattice, ground), lattice.basis, lattice.origin)
     found = None if cells is None else cells.outline()
     if found is None:
         return None
-    layout = Layout(lattice, found.i_range, found.j_range, found.guards, readings)
+    layout = Layout(lattice, found.i_range, found.j_range, found.guards)
     return None if _is_a_row(layout) else layout
 
 

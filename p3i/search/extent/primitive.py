@@ -161,6 +161,10 @@ def _by_coset(
 
 
 def _agreement_of_all(groups: list[Cells]) -> float:
-    """The median agreement of the cells of all groups with the mean of all the others."""
+    """The median agreement of a group's cells with the mean of all the others, the least of all groups.
+
+    Of each group, since where one kind has more cells in sight the mean of all is like it.
+    """
     together = Cells(torch.cat([one.values for one in groups]), torch.cat([one.known for one in groups]))
-    return float(agreement_with_others(together, torch.ones(len(together.values))).median())
+    agree = agreement_with_others(together, torch.ones(len(together.values)))
+    return min(float(one.median()) for one in agree.split([len(group.values) for group in groups]))

@@ -1,6 +1,5 @@
 """From a ring that was fitted to a program: where on it the objects are."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,22 +12,49 @@ from p3i.search.fit.saved import saved_bits
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import offsets_grid
 from p3i.search.look.session import Session
+from p3i.search.result import Reading
 
 # So many radii are tried for the objects.
 _MOST_PLACES = 2
 
 
 def drawn_ring(look: Session, fit: Fit) -> Drawn:
-    """The ring with its draws put where the objects sit: at the radius that explains most."""
+    """The ring with its draws where the objects sit: where most comes again, and stands out.
+
+    The circles that speak for themselves are its readings; the options may ask for one of them.
+    """
+    evidence = look.evidence
     if fit.pattern.upright:
-        fit = _upright(look.evidence, fit)
+        fit = _upright(evidence, fit)
         return Drawn(fit.program(), fit, curve_score(fit))
-    found, most = fit, -math.inf
-    for place in places(look.evidence, _ring_of(look, fit))[:_MOST_PLACES]:
-        moved = _moved(look, fit, place)
-        if moved is not None and (told := saved_bits(look.evidence, moved) * moved.quality) > most:
-            found, most = moved, told
-    return Drawn(found.program(), found, curve_score(found))
+    moved = [_moved(look, fit, place) for place in places(evidence, _ring_of(look, fit))[:_MOST_PLACES]]
+    told = [
+        (saved_bits(evidence, one) * standing_out(evidence, one), one) for one in moved if one is not None
+    ]
+    if not told:
+        return Drawn(fit.program(), fit, curve_score(fit))
+    told.sort(key=lambda one: -one[0])
+    asked = look.config.object
+    drawn = told[next((k for k in range(len(told)) if str(k + 1) == asked), 0)][1]
+    return Drawn(drawn.program(), drawn, curve_score(drawn), readings=_readings(told, drawn))
+
+
+def _readings(told: list[tuple[float, Fit]], drawn: Fit) -> tuple[Reading, ...]:
+    """The circles of a ring as readings, by how much speaks for each; none where there is no choice."""
+    speaking = [(max(much, 0.0), values_of(one)) for much, one in told]
+    total, ours = sum(much for much, _ in speaking), values_of(drawn)
+    if len(speaking) < 2 or total <= 0:
+        return ()
+    step = ours.get("draw.x.angle.j", 360 / len(drawn.pattern.index))
+    return tuple(
+        Reading(
+            str(rank),
+            much / total,
+            (0.0, (values["draw.x.angle.1"] - ours["draw.x.angle.1"]) / step),
+            values["draw.x.radius.1"] / ours["draw.x.radius.1"],
+        )
+        for rank, (much, values) in enumerate(speaking, 1)
+    )
 
 
 def _upright(evidence: Evidence, fit: Fit) -> Fit:

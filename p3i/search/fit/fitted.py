@@ -24,9 +24,9 @@ class Fit:
 
     `index` [N, 2] are the objects in sight, `contrast` [N] how well each is predicted by the others beyond
     half a step. Of curves, `side` is the patches' side in program units and `cost` the robust misfit of the
-    objects' places, `covered` the share of the picture that they fill, and `bits` what a ring's save
-    (fit/saved.py); of lattices, `covered` is the sum of what is predicted beyond SUPPORT, by the cells'
-    shares of the picture.
+    objects' places, and `covered` the share of the picture that they fill; of lattices, `covered` is the sum
+    of what is predicted beyond SUPPORT, by the cells' shares of the picture. `bits` are what the objects of a
+    ring, or the cells of a lattice that agree, save (fit/saved.py).
     """
 
     filling: Filling
@@ -70,10 +70,10 @@ class Fit:
 
 
 def as_large_as_seen(bits: float, covered: float) -> float:
-    """What a ring is worth beside others that save `bits` too, where it fills this share of the picture.
+    """What a pattern is worth beside others that save `bits` too, where it fills this share of the picture.
 
     Natural pictures look alike at every scale, so that small rings, of teeth and ticks, save as much as large
-    ones. Of rings that save alike, the one that is seen larger is meant. Powers of the share between 0.2 and
+    ones. Of those that save alike, the one that is seen larger is meant. Powers of the share between 0.2 and
     0.6 put the same rings first on 60 pictures.
     """
     return bits * covered**0.25
@@ -85,7 +85,7 @@ class Drawn:
 
     `fit` is of the objects that are drawn. `sure` is what its score is made of (look/contrast.py); on rings
     it may be told at another radius than the objects'. `notes` are for people;
-    `readings` are the places of a lattice's cell that may be its object.
+    `readings` are the places of the cell that may be its object.
     """
 
     program: Program

@@ -4,32 +4,25 @@ from dataclasses import replace
 
 import torch
 
-from p3i.search.config import FEWEST_OBJECTS
 from p3i.search.fit.arc import as_far_as_it_goes
 from p3i.search.fit.fitted import Fit, as_large_as_seen
 from p3i.search.fit.grow import grow
 from p3i.search.fit.places import follow, measured, settled
 from p3i.search.fit.rings import says_more
-from p3i.search.fit.saved import saved_bits
+from p3i.search.fit.saved import saved_bits, supported_bits
 from p3i.search.fit.within import followed_within
 from p3i.search.forms.filling import standing, with_settings
 from p3i.search.forms.guess import Guess
+from p3i.search.forms.length import cost_bits
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.patches import spacing
 from p3i.search.look.session import Session
 from p3i.search.look.upright import as_it_stands
+from p3i.search.result import NEEDED_BITS
 
 _ROUNDS, _ROUNDS_WITHIN = 4, 3
 # A guess that says more than what it began with must be as sure as this share of it before it is fitted.
 _LEAST_SHARE = 0.3
-# A pattern of n cells counts as if it had _FEW_CELLS fewer: the numbers and the mean cell take their part.
-_FEW_CELLS = 10
-# Below that number they still count a little, so that a pattern of few cells wins where there is no other.
-_DOUBT = 0.05
-# A fit of less worth is none: on rendered scenes and photos the fits of true patterns had five times as much.
-_LEAST_WORTH = 5e-4
-# A lattice of this worth is certain enough that only a better one could matter.
-_CERTAIN = 0.025
 
 
 def fit_places(look: Session, guess: Guess) -> Fit | None:
@@ -43,7 +36,8 @@ def fit_places(look: Session, guess: Guess) -> Fit | None:
         focal_mm = look.evidence.focal_mm
         return Fit(guess.filling, guess.z, focal_mm, 0.0, cells, nothing, covered=guess.promise)
     if guess.filling is lattice_filling():
-        return grow(look.evidence, guess)
+        grown = grow(look.evidence, guess)
+        return None if grown is None else replace(grown, bits=supported_bits(look.evidence, grown))
     if guess.focal_mm is None:
         setting = guess.filling.settings[guess.setting]
         filling = with_settings(guess.filling, (setting,))
@@ -76,10 +70,10 @@ def _stands_upright(look: Session, fit: Fit) -> bool:
 
 
 def holds(fit: Fit, guess: Guess) -> bool:
-    """Whether a fit is worth drawing: a lattice of some cells, more than what it began with."""
+    """Whether a fit is worth drawing: a lattice whose cells come again, more than what it began with."""
     if guess.base is not None:
         return says_more(fit, guess.base)
-    return guess.filling is not lattice_filling() or guess.settled or worth(fit) >= _LEAST_WORTH
+    return guess.filling is not lattice_filling() or guess.settled or fit.bits > 0
 
 
 def worth(fit: Fit) -> float:
@@ -89,17 +83,12 @@ def worth(fit: Fit) -> float:
     """
     if len(fit.index) == 0:
         return fit.covered
-    if fit.filling is not lattice_filling():
-        rings = len(fit.index[:, 0].unique())
-        return as_large_as_seen(fit.bits, fit.covered) if rings == 1 else fit.mean * len(fit.contrast)
-    contrast = fit.contrast[fit.support]
-    count = len(contrast)
-    if count < FEWEST_OBJECTS:
-        return 0.0
-    beyond_chance = max(1 - _FEW_CELLS / count, _DOUBT * (1 - FEWEST_OBJECTS / count))
-    return fit.covered * float(contrast.mean()) * beyond_chance
+    if fit.filling is lattice_filling():
+        return fit.bits
+    rings = len(fit.index[:, 0].unique())
+    return as_large_as_seen(fit.bits, fit.covered) if rings == 1 else fit.mean * len(fit.contrast)
 
 
 def certain(fit: Fit) -> bool:
-    """Whether only a better fit could still matter."""
-    return fit.filling is lattice_filling() and worth(fit) > _CERTAIN
+    """Whether only a better fit could still matter: a lattice whose cells alone make an answer."""
+    return fit.filling is lattice_filling() and fit.bits - cost_bits(fit.program()) > NEEDED_BITS

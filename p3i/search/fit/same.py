@@ -39,12 +39,13 @@ def says_already(evidence: Evidence, own: Guess, fit: Fit, guess: Guess) -> bool
 
 
 def same_lattice(evidence: Evidence, fit: Fit, other: Fit) -> bool:
-    """Whether two fits mean one lattice, or one a multiple of the other."""
+    """Whether two fits mean one lattice, neither of them a multiple of the other."""
     if fit.filling is not lattice_filling() or other.filling is not fit.filling:
         return False
     ours, theirs = (map_from_index(evidence.frame, one.pattern, one.theta) for one in (fit, other))
     at = ours @ [*fit.index[fit.support].median(0).values.tolist(), 1.0]
-    return _one_divides_the_other(ours, theirs, at[:2] / at[2])
+    first, second = (_steps_at(one, at[:2] / at[2]) for one in (ours, theirs))
+    return _whole_multiple(first, second) and _whole_multiple(second, first)
 
 
 def _one_divides_the_other(a: np.ndarray, b: np.ndarray, point: np.ndarray) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from p3i.search.answer import Answer
-from p3i.search.fit.fitted import Fit
+from p3i.search.fit.fitted import Fit, as_large_as_seen
 from p3i.search.judge.accept import beyond_noise
 from p3i.search.judge.region import objects_px, region_px
 from p3i.search.look.cells import sample_points
@@ -27,7 +27,8 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     """The answers, the best first, of which the first knows, and says, which patterns lie beside its own.
 
     `fits` are all that were grown, the best first; `finish` works one out to a program. A pattern is told of
-    only where its own program reaches what an answer needs, and once.
+    only where its own program reaches what an answer needs, and once; one that says more than the first
+    answer takes its place.
     """
     if not answers or not beyond_noise(answers[0].worth):
         return answers
@@ -55,8 +56,19 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
             keep(other)
     if not others:
         return answers
-    told = tuple(_told(evidence, other) for other in others)
-    return [dataclasses.replace(first, notes=(*first.notes, _note(told)), others=told), *answers[1:]]
+    dominant = max(first, *others, key=lambda one: _as_seen(evidence, one))
+    beside = [one for one in (first, *others) if one is not dominant]
+    told = tuple(_told(evidence, other) for other in beside)
+    rest = answers[1:] if dominant is first else [one for one in answers if one is not dominant]
+    return [dataclasses.replace(dominant, notes=(*dominant.notes, _note(told)), others=told), *rest]
+
+
+def _as_seen(evidence: Evidence, answer: Answer) -> float:
+    """What an answer is worth beside others of the photo, where it fills this part of it."""
+    size = evidence.part.size
+    return as_large_as_seen(
+        answer.worth, cv2.contourArea(_polygon(evidence, answer)) / (size.width * size.height)
+    )
 
 
 def _told(evidence: Evidence, answer: Answer) -> Other:

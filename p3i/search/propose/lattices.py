@@ -3,12 +3,24 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from p3i.search.fit.best import Best
+from p3i.search.fit.fitting import certain
 from p3i.search.forms.guess import Guess
 from p3i.search.look.session import Session
-from p3i.search.propose.windows import straightened_guesses, window_guesses
+from p3i.search.propose.windows import SIDE, straightened_guesses, window_guesses
 
 # So many guesses of each kind are looked at.
 _MOST = 10
+
+
+def lattice_rounds(look: Session, best: Best) -> Iterator[Iterator[Guess]]:
+    """The guesses of views and windows; where no fit of them is certain, those of windows half as wide.
+
+    A small pattern fills no window of the first kind, and what lies around it speaks there as well.
+    """
+    yield lattice_guesses(look)
+    if not any(certain(fit) for fit in best.fits):
+        yield iter(_beside_the_best(window_guesses(look.evidence, side=SIDE // 2)[:_MOST]))
 
 
 def lattice_guesses(look: Session) -> Iterator[Guess]:

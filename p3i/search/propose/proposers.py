@@ -13,7 +13,7 @@ from p3i.search.forms.guess import Guess
 from p3i.search.forms.sketches import WALKED_SHAPES, Shape, Sketched
 from p3i.search.look.session import Session
 from p3i.search.propose.holes import hole_guesses
-from p3i.search.propose.lattices import lattice_guesses
+from p3i.search.propose.lattices import lattice_rounds
 from p3i.search.propose.paper import paper_guesses
 from p3i.search.propose.repeats import guesses_around
 from p3i.search.propose.votes import ring_rounds
@@ -36,7 +36,7 @@ class Proposer:
     all_at_once: bool = True
 
 
-LATTICES = Proposer(frozenset({"lattice"}), lambda look, _, __: iter([lattice_guesses(look)]), 7, 3)
+LATTICES = Proposer(frozenset({"lattice"}), lambda look, _, best: lattice_rounds(look, best), 7, 3)
 RINGS = Proposer(frozenset({"ring", "arc"}), lambda look, _, best: ring_rounds(look, best), 8, 2)
 AROUND = Proposer(
     frozenset({"rings in rings", "fan", "rings in a row"}),

@@ -5,6 +5,7 @@ of the view. OpenCV's transforms are used on packed real spectra: they were the 
 they are told which rows are empty, which keeps them from the processor's own.
 """
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -36,6 +37,8 @@ _FINER = (
     [[1 / 3, -1 / 3], [0, 1]],
 )
 _MOST_DIVISIONS = 3
+# A correlation is told up to this: where a view has no noise, there would be no end to what it saves.
+_MOST_TOLD = 0.99
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,20 +46,22 @@ class Autocorrelation:
     """All shifts [S, S], zero in the middle.
 
     `values` float32, -1 where too little overlaps; `judged` where enough does; `trust` is the root of the
-    share of the view that overlaps itself: what few pixels say is said by chance more often.
+    share of the view that overlaps itself: what few pixels say is said by chance more often. The view has so
+    many `pixels`, each counted by its weight.
     """
 
     values: np.ndarray
     judged: np.ndarray
     trust: np.ndarray
+    pixels: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShiftPair:
-    """Two shifts that span a lattice: `basis` [2, 2] rows in view pixels, `worth` the valley contrast."""
+    """Two shifts that span a lattice: `basis` [2, 2] rows in view pixels, and the `bits` that it saves."""
 
     basis: np.ndarray
-    worth: float
+    bits: float
 
 
 def autocorrelation(view: np.ndarray, weights: np.ndarray) -> Autocorrelation:
@@ -91,9 +96,8 @@ def autocorrelation(view: np.ndarray, weights: np.ndarray) -> Autocorrelation:
     judged = (overlap > _LEAST_OVERLAP * overlap[0, 0]) & (norm > _LEAST_OVERLAP * norm[0, 0])
     values = np.where(judged, inner / np.maximum(norm, 1e-6 * max(float(norm[0, 0]), 1e-9)), -1)
     trust = np.sqrt(np.clip(overlap / max(float(overlap[0, 0]), 1e-9), 0, 1))
-    return Autocorrelation(
-        np.fft.fftshift(values).astype(np.float32), np.fft.fftshift(judged), np.fft.fftshift(trust)
-    )
+    shifted = (np.fft.fftshift(one) for one in (values.astype(np.float32), judged, trust))
+    return Autocorrelation(*shifted, pixels=float(weights.sum()))
 
 
 def best_pair(
@@ -121,7 +125,35 @@ def best_pair(
     nearly = np.flatnonzero(score >= _NEARLY_BEST * score.max())
     best = nearly[np.argmin(area[nearly])]
     basis = _divided(found, np.stack([u[best], v[best]]), least=least if least_part is None else least_part)
-    return ShiftPair(basis, float(score[best]))
+    return ShiftPair(basis, _saved_bits(found, basis))
+
+
+def _saved_bits(found: Autocorrelation, basis: np.ndarray) -> float:
+    """What a lattice saves of each sample of a cell, in bits, over all cells of the view.
+
+    N cells that are told by others with the correlation r save -N/2 log2(1 - r^2). Here r is the mean value
+    at all steps of the lattice, each counted by the pixels that overlap, less that at the half steps, of
+    whichever half is most alike: what is alike everywhere repeats nowhere.
+    """
+    middle = found.values.shape[0] // 2
+    basis = reduce_basis(basis)
+    most = int(middle / np.hypot(*basis.T).min()) + 1  # steps to the rim, at an angle of 60 degrees or more
+    i, j = np.meshgrid(np.arange(-most, most + 1), np.arange(most + 1))  # the other half mirrors this one
+    index = np.stack([i, j], -1)[(j > 0) | (i > 0)]
+
+    def mean(half: tuple[float, float]) -> float:
+        shifts = (index + half) @ basis
+        shifts = shifts[(np.abs(shifts) < middle - 1).all(1)]
+        across, down = (middle + np.round(shifts).astype(int)).T
+        counted = found.trust[down, across] ** 2 * found.judged[down, across]
+        if not counted.any():
+            return 0.0
+        return float((_values_at(found, shifts) * counted).sum() / counted.sum())
+
+    between = max(mean(half) for half in ((0.5, 0.0), (0.0, 0.5), (0.5, 0.5)))
+    told = min(max(mean((0.0, 0.0)) - max(between, 0.0), 0.0), _MOST_TOLD)
+    cells = found.pixels / abs(float(np.linalg.det(basis)))
+    return -cells / 2 * math.log2(1 - told**2)
 
 
 def _divided(found: Autocorrelation, basis: np.ndarray, *, least: float) -> np.ndarray:

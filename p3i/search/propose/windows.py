@@ -25,7 +25,8 @@ MOST_TILT_DEG = 66.0
 _CHANNELS = 4
 # Shortest and longest shift, in pixels of the canvas.
 _SHIFTS = (4.0, 60.0)
-_WINDOW = 128
+SIDE = 128
+"""The side of a window, in pixels of the fine map."""
 # Parts of a lattice may be shorter than what begins one, down to two pixels, the least that shows a valley.
 _LEAST_PART = 2.0
 
@@ -45,16 +46,16 @@ def straightened_guesses(evidence: Evidence) -> list[Guess]:
         )
         if pair is not None:
             lattice = Lattice(rx_deg, ry_deg, reduce_basis(pair.basis * unit), middle)
-            found.append(lattice_guess(lattice, pair.worth, local=False))
+            found.append(lattice_guess(lattice, pair.bits, local=False))
     return sorted(found, key=lambda guess: -guess.promise)
 
 
-def window_guesses(evidence: Evidence) -> list[Guess]:
+def window_guesses(evidence: Evidence, *, side: int = SIDE) -> list[Guess]:
     """A guess for each window that shows a lattice, seen straight on, the most promising first."""
     level = evidence.level(FINE, blur=0.5)
     planes = level.values[:_CHANNELS].permute(1, 2, 0).contiguous().numpy()
     known = level.valid.numpy().astype(np.float32)
-    side = min(_WINDOW, *known.shape)
+    side = min(side, *known.shape)
     if side < 32:
         return []
     offset = np.arange(side) - (side - 1) / 2
@@ -80,7 +81,7 @@ def window_guesses(evidence: Evidence) -> list[Guess]:
             origin = (middle[:2] - np.array(size.middle)) / size.unit_px
             basis = pair.basis / level.unit_px
             lattice = Lattice(0.0, 0.0, reduce_basis(basis), origin)
-            found.append(lattice_guess(lattice, pair.worth, local=True))
+            found.append(lattice_guess(lattice, pair.bits, local=True))
     return sorted(found, key=lambda guess: -guess.promise)
 
 

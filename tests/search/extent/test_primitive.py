@@ -77,6 +77,19 @@ def test_a_square_of_a_chequered_floor_is_half_a_cell() -> None:
     assert set((np.round(points / SIDE).sum(1) % 2).tolist()) == {0.0}
 
 
+@pytest.mark.parametrize("colour", [0, 1])
+def test_a_chequered_floor_of_which_one_colour_is_mostly_covered_is_one_all_the_same(colour: int) -> None:
+    evidence, squares = chequered_floor()
+    fit = fit_of(evidence, squares)
+    kind = fit.index.sum(1) % 2 == colour
+    seen = ~kind | (torch.arange(len(kind)) % 4 == 0)
+    [(theta, _)] = primitive(
+        evidence, PATTERN, replace(fit, index=fit.index[seen], contrast=fit.contrast[seen])
+    )
+    full = np.array([[1, 1], [1, -1]]) @ squares.basis
+    assert lattice_error(Lattice.of(PATTERN, theta).basis, full) < 1e-6
+
+
 def test_squares_know_their_kind_on_a_chequered_floor_and_do_not_where_colours_have_no_rule() -> None:
     shares = []
     for without_rule in (False, True):

@@ -12,9 +12,12 @@ from truth import SMALL, pose_error_deg, small_scene
 from p3i.evaluation.lattice_scenes import lattice_scene
 from p3i.interp.lens import photo_from_straight, straight_from_photo
 from p3i.search import synthesize as synthesize_module
+from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
 from p3i.search.fit.places import measured, numbers_of
 from p3i.search.forms.spelled import ring_filling
+from p3i.search.judge.elsewhere import with_others
+from p3i.search.judge.region import objects_px
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import NEEDED_BITS
@@ -76,6 +79,26 @@ def test_a_plane_whose_cells_reach_into_the_answers_region_is_told_of_too() -> N
     image = beside(lattice_scene(35).pixels, lattice_scene(59).pixels)
     result = synthesize(image, SearchConfig(structure="lattice"))
     assert any("another pattern lies around" in note for note in result.notes), result.notes
+
+
+def test_the_pattern_that_says_more_is_the_answer_though_another_was_found_first() -> None:
+    look = Session(Evidence(side_by_side(), SearchConfig(), 35.0), SearchConfig(structure="lattice"))
+    found = searched(look)
+    worked_out = [synthesize_module._finished(look, fit) for fit in found.fits]
+    answers = sorted((one for one in worked_out if one is not None), key=lambda one: -one.worth)
+    dominant = answers[0]
+    beside = next(
+        one for one in answers if abs(_across(look, one) - _across(look, dominant)) > SMALL.width / 4
+    )
+    told = with_others(look, found.fits, [beside], finish=synthesize_module._finished)
+    assert told[0].program == dominant.program
+    assert told[0].others[0].center[0] == pytest.approx(_across(look, beside), abs=2)
+    assert beside.program in [one.program for one in told[1:]]
+
+
+def _across(look: Session, answer: Answer) -> float:
+    """How far from the left, in pixels, the middle of an answer's objects lies."""
+    return float(np.median(objects_px(answer, look.evidence.image, 35.0)[:, 0]))
 
 
 def test_of_a_single_pattern_nothing_is_told() -> None:

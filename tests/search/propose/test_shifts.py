@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from p3i.search.forms.lattice import reduce_basis
-from p3i.search.propose.shifts import Autocorrelation, _divided, autocorrelation, best_pair, valley_contrast
+from p3i.search.propose.shifts import (
+    Autocorrelation,
+    _divided,
+    _saved_bits,
+    autocorrelation,
+    best_pair,
+    valley_contrast,
+)
 
 
 def view_of(seed: int, *, height: int = 20, width: int = 24, channels: int = 3) -> np.ndarray:
@@ -103,7 +110,7 @@ def test_the_pair_of_a_lattice_is_its_basis(basis: list[list[float]]) -> None:
     pair = best_pair(autocorrelation(dots(steps), np.ones((128, 128), np.float32)), least=4, most=60)
     assert pair is not None
     np.testing.assert_allclose(reduce_basis(pair.basis), reduce_basis(steps), atol=0.3)
-    assert pair.worth > 0.5
+    assert pair.bits > 20
 
 
 @pytest.mark.parametrize("factors", [[[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]], [[2, 0], [0, 2]]])
@@ -112,6 +119,36 @@ def test_a_multiple_of_the_cell_comes_back_to_the_cell(factors: list[list[int]])
     found = autocorrelation(dots(steps), np.ones((128, 128), np.float32))
     basis = _divided(found, np.array(factors) @ steps, least=4)
     np.testing.assert_allclose(reduce_basis(basis), reduce_basis(steps), atol=0.3)
+
+
+STEPS = np.array([[14.0, 3.0], [8.0, 15.0]])
+EVERYWHERE = np.ones((128, 128), np.float32)
+
+
+@pytest.mark.parametrize("words", [[[1, 1], [0, 1]], [[0, 1], [-1, 0]], [[2, 1], [1, 1]], [[-1, 0], [3, -1]]])
+def test_what_a_lattice_saves_is_the_same_for_all_its_bases(words: list[list[int]]) -> None:
+    found = autocorrelation(dots(STEPS), EVERYWHERE)
+    bits = _saved_bits(found, STEPS)
+    assert bits > 20
+    assert _saved_bits(found, np.array(words) @ STEPS) == pytest.approx(bits, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "rows", [[[2, 0], [0, 1]], [[3, 0], [0, 2]], [[0.5, 0], [0, 1]], [[1.3, 0], [0.2, 0.8]]]
+)
+def test_multiples_parts_and_other_lattices_save_less_than_the_cell(rows: list[list[float]]) -> None:
+    found = autocorrelation(dots(STEPS), EVERYWHERE)
+    assert _saved_bits(found, np.array(rows) @ STEPS) < 0.3 * _saved_bits(found, STEPS)
+
+
+def test_a_few_cells_that_agree_by_chance_save_less_than_many_that_agree_a_little() -> None:
+    random = np.random.default_rng(5)
+    noise = random.normal(0, 0.12, (128, 128, 1)).astype(np.float32)
+    many = best_pair(autocorrelation(dots(STEPS) + noise, EVERYWHERE), least=4, most=60)
+    blobs = cv2.GaussianBlur(random.normal(0, 1, (128, 128)), (0, 0), 4).astype(np.float32)[:, :, None]
+    few = best_pair(autocorrelation(blobs - blobs.mean(), EVERYWHERE), least=4, most=60)
+    assert many is not None and few is not None
+    assert many.bits > 10 * few.bits
 
 
 def test_steps_shorter_or_longer_than_asked_for_are_not_taken() -> None:

@@ -1,5 +1,6 @@
 """Proposals: one of the first few is near enough to the truth to be refined."""
 
+import cv2
 import numpy as np
 from truth import PATTERN, evidence_of, lattice_error, lattice_of, normal, pose_error_deg, small_scene
 
@@ -12,6 +13,7 @@ from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.windows import (
     MOST_TILT_DEG,
     POSE_STEP_DEG,
+    SIDE,
     straightened_guesses,
     window_guesses,
 )
@@ -107,3 +109,32 @@ def test_windows_without_known_pixels_are_left_out() -> None:
     found = window_guesses(Evidence(Image(scene.image().pixels, valid), SearchConfig(), 35.0))
     assert found
     assert all(origin_px(proposal.lattice)[0] < 0.6 * scene.size.width for proposal in found)
+
+
+def small_among_stripes() -> Image:
+    """A tile of 5 x 5 dots, 50 pixels wide, on a ground of stripes of many widths."""
+    y, x = np.mgrid[0:448, 0:640]
+    random = np.random.default_rng(3)
+    edges = np.sort(random.uniform(-300, 900, 90))
+    ground = 0.25 + 0.6 * (np.searchsorted(edges, x + 0.7 * y) % 2)
+    dots = np.where(np.hypot(x % 10 - 5, y % 10 - 5) < 3, 0.5, 0.58)
+    tile = (x >= 300) & (x < 350) & (y >= 200) & (y < 250)
+    grey = cv2.GaussianBlur(np.where(tile, dots, ground).astype(np.float32), (0, 0), 0.7)
+    pixels = np.repeat(grey[:, :, None], 3, 2)
+    return Image(pixels, np.ones(grey.shape, bool))
+
+
+def test_windows_half_as_wide_see_a_small_pattern_that_whole_ones_do_not() -> None:
+    image = small_among_stripes()
+    evidence = Evidence(image, SearchConfig(), 35.0)
+    middle = np.array(image.size.middle)
+
+    def rank(side: int) -> int:
+        for place, guess in enumerate(window_guesses(evidence, side=side)):
+            steps = np.hypot(*(guess.lattice.basis * image.size.unit_px).T)
+            at = guess.lattice.origin * image.size.unit_px + middle
+            if np.abs(steps - 10).max() < 0.5 and (abs(at - (325, 225)) < 60).all():
+                return place
+        return 999
+
+    assert rank(SIDE // 2) == 0 < rank(SIDE)
