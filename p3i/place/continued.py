@@ -70,6 +70,14 @@ class Continued:
     points: Array
     bounds: tuple[Bound, ...]
 
+    def notes(self) -> list[str]:
+        """A sentence where something goes on through a hole of the photo."""
+        count = len(self.index)
+        if not count:
+            return []
+        what = "object is" if count == 1 else "objects are"
+        return [f"the pattern goes on through the hole: {count} {what} added that the program does not draw"]
+
     def joined(self, laid: Placed) -> Placed:
         """The program with what goes on behind its own objects."""
         return dataclasses.replace(
@@ -128,9 +136,35 @@ def continued(
     if found is not None:
         bits[told] = found
     bounds = _moved(bounds, index, bits, whole)
-    index = index[free & _inside(index, bounds) & (shown.asked > 0)]
+    return _distinct(laid, index[free & _inside(index, bounds) & (shown.asked > 0)], bounds)
+
+
+def followed(laid: Placed, more: Continued, over: Mask) -> Continued:
+    """The objects that continue `laid` as `more` did another program of its photo, where `over` [H, W].
+
+    Line by line beyond each bound as far as most of a line's middles lie there: of a pattern that is yet to
+    be laid, what the photo shows tells nothing. A program with the bounds of the other goes on as far.
+    """
+    height, width = over.shape
+    forms = tuple(_forms(nest(laid.pattern.program)))
+    view = _View(laid, ~over, over, (-0.5, -0.5, width - 0.5, height - 0.5))
+    index = _around(view) if over.any() else np.zeros((0, 2), np.int64)
+    index = index[_fresh(laid, index)]
+    at, front = project(laid.image_from_plane, laid.at(index))
+    pixel = np.rint(np.where(front[:, None], at, -1)).astype(np.int64)
+    inside = (pixel >= 0).all(1) & (pixel < np.array([width, height])).all(1)
+    index, (x, y) = index[inside], pixel[inside].T
+    there = over[y, x]
+    bounds = more.bounds
+    if forms != tuple(bound.form for bound in bounds):
+        bounds = _moved(tuple(Bound(form) for form in forms), index, np.zeros(len(index)), ~there)
+    return _distinct(laid, index[there & _inside(index, bounds)], bounds)
+
+
+def _distinct(laid: Placed, index: Index, bounds: tuple[Bound, ...]) -> Continued:
+    """What goes on, turns of a ring that coincide as one."""
     points = laid.at(index)
-    _, first = np.unique(np.rint(points * 1e3), axis=0, return_index=True)  # turns that coincide are one
+    _, first = np.unique(np.rint(points * 1e3), axis=0, return_index=True)
     first = np.sort(first)
     return Continued(index[first], points[first], bounds)
 
