@@ -23,10 +23,11 @@ from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
 from p3i.paint.fill.cleared import cleared, covered, local_points, object_masks, windows
 from p3i.paint.fill.completed import Completed, completed
-from p3i.paint.fill.cutout import Cutout, Levels, cutout, doubts
+from p3i.paint.fill.cutout import Cutout, cutout, doubts
 from p3i.paint.fill.filled import share_text
 from p3i.paint.fill.holes import marked, on_flat
 from p3i.paint.fill.pieces import cells_on
+from p3i.paint.fill.sampled import Levels
 from p3i.place.continued import followed
 from p3i.place.flat import flat_of
 from p3i.place.moves import frames, pitch_px

@@ -8,7 +8,7 @@ from p3i import loads
 from p3i.paint.fill.cutout import cutout
 from p3i.paint.fill.holes import CHANGED
 from p3i.paint.fill.inpaint import inpaint
-from p3i.paint.fill.through import continued, through
+from p3i.paint.fill.through import continuations, through
 from p3i.place.placed import placed
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
@@ -118,5 +118,5 @@ def test_a_line_is_drawn_on_where_both_sides_show_it_and_nowhere_else() -> None:
     given = np.where(known[..., None], values, np.float32(9))
     found = through(given, known, ~known, np.array([(1.0, 0), (0, 1)]))
     assert np.abs(found - values).mean() < 0.03
-    along = continued(given, known, np.array([(1.0, 0)]))[1]
+    along = continuations(given, known, np.array([(1.0, 0)]))[1]
     assert np.abs(along - values)[:, 12:29].max() < 1e-5
