@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
-from p3i.paint.fill.cleared import cleared, covered, local_points, object_masks, windows
+from p3i.paint.fill.cleared import cleared, covered, hanging, local_points, object_masks, windows
 from p3i.paint.fill.completed import Completed, completed
 from p3i.paint.fill.cutout import Cutout, cutout, doubts
 from p3i.paint.fill.filled import share_text
@@ -49,6 +49,8 @@ _SAME = 0.05
 # An object is worth copying where it is at most this many times farther from the median than a typical one.
 _GOOD = 1.5
 _GAINS = (0.6, 1.6)
+# A pixel that an object covers by as much is its own.
+_LEAST_OWN = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,9 +194,10 @@ def _laid_anew(
     # What was filled shows what the others do already, and is no object to copy.
     cut = cutout(laid, masked(photo, ~whole.known))
     notes = doubts(cut)
+    ground, every = cleared(photo.pixels, photo.valid, laid, cut)
     own = _mask(_only(laid, old_place), cut)
-    removed = covered(_only(laid, gone), cut) & (own < 0.02) & photo.valid
-    ground = cleared(photo.pixels, photo.valid, laid, cut)
+    removed = covered(_only(laid, gone), cut) & (own < _LEAST_OWN) & photo.valid
+    removed |= hanging(every & ~covered(laid, cut), removed)
     pixels = np.where(removed[:, :, None], ground, photo.pixels)
     scale = options.scale
     if scale is None:

@@ -129,7 +129,7 @@ def inpaint(
     notes += more.notes()
     if wanted.removed:
         ground, gone, said = _taken_away(flat.photo, flat.placed, flat_hole, wanted.removed)
-        pixels = np.where(gone[:, :, None], ground, pixels)
+        pixels = ground if not hole.any() else np.where(gone[:, :, None], ground, pixels)
         notes += [CHANGED, *said]
     guess, strange = beside_hole(flat.photo, flat.placed, flat_hole | gone)
     of_pattern = flat_hole & ~gone
@@ -138,7 +138,7 @@ def inpaint(
         pixels, parts = flat.bent(np.asarray(pixels, np.float32)), [flat.bent_mask(part) for part in parts]
     unlike, fallback, guess, strange, gone = parts
     hole = hole | (gone & photo.valid)
-    pixels = np.where(hole[:, :, None], pixels, photo.pixels).astype(np.float32)
+    pixels = np.where(hole[:, :, None], pixels, photo.pixels).astype(np.float32, copy=False)
     reach_px = max(3.0, _BESIDE * _typical_pitch_px(flat.placed))
     facts = facts_of(hole, unlike=unlike, guess=guess, strange=strange, ground=gone, reach_px=reach_px)
     told = [one.sentence() for one in facts if one.note]
@@ -176,8 +176,9 @@ def _taken_away(
     """
     known = masked(photo, hole) if hole.any() else photo
     cut = cutout(laid, known)
-    gone = covered(only(laid, removed), cut) & photo.valid
-    ground = cleared(known.pixels, known.valid, laid, cut, objects=gone)
+    ground, gone = cleared(
+        known.pixels, known.valid, laid, cut, objects=covered(only(laid, removed), cut) & photo.valid
+    )
     return ground, gone, doubts(cut)
 
 

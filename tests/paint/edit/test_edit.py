@@ -44,7 +44,7 @@ def test_the_same_program_leaves_the_photo_as_it_is(text: str) -> None:
     found = edit(photo, loads(text), loads(text))
     assert np.array_equal(found.pixels, photo.pixels)
     assert not found.touched.any()
-    assert (found.removed, found.added) == (0, 0)
+    assert (found.removed, found.copied) == (0, 0)
 
 
 @pytest.mark.parametrize("text", [LATTICE, RING])
@@ -59,7 +59,7 @@ def test_the_object_of_a_cell_is_told_from_its_ground(text: str) -> None:
 def test_a_sparser_program_removes_every_other_column_and_keeps_the_rest() -> None:
     photo = drawn(LATTICE)
     found = edit(photo, loads(LATTICE), loads(SPARSER))
-    assert (found.kept, found.removed, found.added) == (35, 28, 0)
+    assert (found.kept, found.removed, found.copied) == (35, 28, 0)
     expected = drawn(SPARSER)
     gone = near(photo, LATTICE, 24) & ~near(photo, SPARSER, 26)
     assert wrong(photo.pixels, expected.pixels, gone) > 30
@@ -74,7 +74,7 @@ def test_added_objects_look_as_if_they_had_always_been_there(text: str) -> None:
     found = edit(photo, loads(LATTICE), loads(text))
     camera = LATTICE.split("\n", 1)[0] + "\n"
     laid = placed(loads(text if text.startswith("Set") else camera + text), photo)
-    assert found.added > 5
+    assert found.copied > 5
     for x, y in np.rint(laid.centers_px()[0]).astype(int):
         here = found.pixels[y - 3 : y + 4, x - 3 : x + 4].mean((0, 1))
         assert here[1] > 1.2 * here[2] and here.mean() < 0.45, "a mark is dark and green in its middle"
@@ -87,7 +87,7 @@ def test_marks_turn_with_their_ring() -> None:
     found = edit(photo, loads(RING), loads(new))
     expected = drawn(new)
     marks = near(photo, new, 11)
-    assert found.removed == found.added == 12
+    assert found.removed == found.copied == 12
     assert wrong(found.pixels, expected.pixels, marks) < 8
 
 
