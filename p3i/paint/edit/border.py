@@ -48,9 +48,7 @@ def border_px(photo: Image, laid: Placed) -> Sides:
     hole = rim & cells
     if not hole.any() or not (cells & small.valid & ~rim).any():
         return 0, 0, 0, 0
-    pixels, bare = fill_by_stack(
-        small.pixels, small.valid & cells & ~rim, hole, laid, most_tried=_MOST_TRIED
-    )
+    pixels, bare = fill_by_stack(small.pixels, small.valid & cells & ~rim, hole, laid, most_tried=_MOST_TRIED)
     off = np.where(hole & small.valid & ~bare, np.abs(pixels - small.pixels).mean(2), np.nan)
     # Each side in turn lies on top.
     left, top, right, bottom = (
@@ -59,7 +57,7 @@ def border_px(photo: Image, laid: Placed) -> Sides:
     return left, top, right, bottom
 
 
-def inside(size: Size, border: Sides) -> Mask:
+def within(size: Size, border: Sides) -> Mask:
     """The pixels [H, W] of a photo that its border leaves."""
     left, top, right, bottom = border
     found = np.zeros((size.height, size.width), bool)

@@ -24,6 +24,7 @@ from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
 from p3i.grammar.printer import format_program
 from p3i.options.extend import SIDES, Beyond, ExtendOptions
+from p3i.paint.edit.border import border_px, within
 from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
 from p3i.paint.fill.holes import marked, on_flat
@@ -159,7 +160,11 @@ def extend(
 
     pixels, known, shown = _laid_out(flat, ~unknown, sides, size)
     ground = _ground(wide)
-    pixels, bare = _painted(pixels, known & ground, ~shown & ground, wide, progress)
+    of_pattern = known & ground
+    if flat.k1 is None and any(border := border_px(flat.photo, flat.placed)):
+        of_pattern[_window(sides, photo.size)] &= within(photo.size, border)
+        notes.append(_border_note(border))
+    pixels, bare = _painted(pixels, of_pattern, ~shown & ground, wide, progress)
     bare |= ~shown & ~ground
     # What was transparent stays so where the pattern does not go on.
     inside, corner = _window(sides, flat.size), _window(flat.corner, flat.size)
@@ -296,6 +301,14 @@ def _program(program: Program, wide: Placed, more: Continued, sides: Sides, old:
         canvas=(wide.size.width, wide.size.height), focal_mm=round(wide.camera.focal_mm * ratio, 6)
     )
     return map_affines(dataclasses.replace(drawn, header=header), change)
+
+
+def _border_note(border: Sides) -> str:
+    where = ", ".join(f"{name} {px}" for name, px in zip(SIDES, border, strict=True) if px)
+    return (
+        f"what lies along the photo's edge is not like its pattern ({where} pixels): it stays, and takes no part "
+        "in what is added; a border is best cropped off first"
+    )
 
 
 def _cropped_note(asked: Sides, kept: Sides) -> list[str]:

@@ -228,8 +228,8 @@ def _cropped(placed: Placed, window: tuple[slice, slice]) -> Placed:
 
 def hanging(other: Mask, wanted: Mask) -> Mask:
     """The parts of a mask [H, W] that touch what is wanted [H, W]: a rim or shadow beyond its outline."""
-    count, labels = cv2.connectedComponents((other | wanted).astype(np.uint8), connectivity=8)
-    touching = np.zeros(count, bool)
+    count, parts = cv2.connectedComponents((other | wanted).astype(np.uint8), connectivity=8)
+    labels, touching = np.asarray(parts, np.int32), np.zeros(count, bool)
     touching[labels[wanted]] = True
     return other & touching[labels]
 

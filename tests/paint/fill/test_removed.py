@@ -50,6 +50,38 @@ def test_bars_between_objects_stay_between_them(axis: int) -> None:
     assert found.removed == 3
 
 
+def test_light_that_rises_over_the_photo_leaves_no_steps_between_removed_neighbours() -> None:
+    """Each cell is lighter on one side: no ground of a cell, but light."""
+    plane = plane_of(LATTICE)
+    light = np.exp(0.012 * plane[..., :1]).astype(np.float32)
+    ground = np.float32((0.6, 0.1, 0.15)) * light
+    photo = with_objects(LATTICE, ground, radius=3.6)
+    found = inpaint(photo, loads(LATTICE), remove=[(0, 0), (1, 0), (0, 1), (1, 1), (-1, 0), (-1, 1)])
+    assert np.abs(found.pixels - ground)[found.hole].max() * 255 < 6
+    assert found.hole.mean() < 0.12, "the ground between them is not taken for theirs"
+
+
+def test_what_hangs_on_an_object_beyond_the_common_outline_goes_with_it() -> None:
+    """One disc is larger than the others: its rim would stay as a ring."""
+    ground = np.full((400, 480, 3), 0.75, np.float32)
+    photo = with_objects(LATTICE, ground, radius=2.6)
+    pixels, plane = photo.pixels.copy(), plane_of(LATTICE)
+    laid = placed(loads(LATTICE), photo)
+    one = laid.points[[tuple(index) == (1, 1) for index in laid.index.tolist()]][0]
+    pixels[np.hypot(*np.moveaxis(plane - one, -1, 0)) < 3.1] = INK
+    found = inpaint(Image(pixels, photo.valid), loads(LATTICE), remove=[(1, 1)])
+    here = np.hypot(*np.moveaxis(plane - one, -1, 0)) < 4
+    assert np.abs(found.pixels - ground)[here].max() * 255 < 8
+
+
+def test_far_objects_are_taken_away_each_as_if_alone() -> None:
+    photo = with_objects(LATTICE, barred(LATTICE, 0, at=4.5), radius=2.6)
+    both = inpaint(photo, loads(LATTICE), remove=[(-4, -3), (4, 3)])
+    for one in ((-4, -3), (4, 3)):
+        alone = inpaint(photo, loads(LATTICE), remove=[one])
+        assert np.array_equal(both.pixels[alone.hole], alone.pixels[alone.hole])
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_line_that_meets_an_object_on_both_sides_goes_on_under_it(axis: int) -> None:
     ground = barred(LATTICE, axis, at=0)
