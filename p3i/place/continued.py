@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from p3i.grammar.ast import Affine, For, Polar, Program, Statement
 from p3i.interp.unroll import SLACK, Nest, nest
 from p3i.place.moves import nearest
-from p3i.place.outlines import chart_of
+from p3i.place.outlines import chart_of, pitch
 from p3i.place.placed import Placed
 from p3i.place.presence import bits_of
 from p3i.vision.image import Image, masked
@@ -38,6 +38,8 @@ _LEAST_PX = 4.0
 _LOOKS = 7
 # A line of cells is as the program has it where the photo shows this share of them wholly.
 _SEEN = 0.5
+# What lies nearer to an object than this, in distances to the next, is in its cell, if to no other nearer.
+_IN_CELL = 0.75
 # Rings whose step divides 360 up to this are closed.
 _TURN_SLACK = 0.1
 
@@ -139,22 +141,23 @@ def continued(
     return _distinct(laid, index[free & _inside(index, bounds) & (shown.asked > 0)], bounds)
 
 
-def followed(laid: Placed, more: Continued, over: Mask) -> Continued:
-    """The objects that continue `laid` as `more` did another program of its photo, where `over` [H, W].
+def followed(laid: Placed, other: Placed, more: Continued) -> Continued:
+    """The objects that continue `laid` where `more` did `other`, another program of the same photo.
 
-    Line by line beyond each bound as far as most of a line's middles lie there: of a pattern that is yet to
-    be laid, what the photo shows tells nothing. A program with the bounds of the other goes on as far.
+    `other` ends with those that came in. Line by line beyond each bound, as far as most of a line lies in
+    cells of these: of a pattern that is yet to be laid, what the photo shows tells nothing. A program with
+    the bounds of the other goes on as far.
     """
-    height, width = over.shape
     forms = tuple(_forms(nest(laid.pattern.program)))
-    view = _View(laid, ~over, over, (-0.5, -0.5, width - 0.5, height - 0.5))
-    index = _around(view) if over.any() else np.zeros((0, 2), np.int64)
+    everywhere = np.ones((laid.size.height, laid.size.width), bool)
+    frame = (-0.5, -0.5, laid.size.width - 0.5, laid.size.height - 0.5)
+    index = _around(_View(laid, everywhere, ~everywhere, frame))
     index = index[_fresh(laid, index)]
-    at, front = project(laid.image_from_plane, laid.at(index))
-    pixel = np.rint(np.where(front[:, None], at, -1)).astype(np.int64)
-    inside = (pixel >= 0).all(1) & (pixel < np.array([width, height])).all(1)
-    index, (x, y) = index[inside], pixel[inside].T
-    there = over[y, x]
+    points = laid.at(index)
+    number = nearest(other, points)
+    away = np.hypot(*(points - other.points[number]).T)
+    there = number >= len(other.index) - len(more.index)
+    there &= away < _IN_CELL * pitch(chart_of(other.pattern))
     bounds = more.bounds
     if forms != tuple(bound.form for bound in bounds):
         bounds = _moved(tuple(Bound(form) for form in forms), index, np.zeros(len(index)), ~there)

@@ -26,7 +26,6 @@ from p3i.paint.fill.completed import Completed, completed
 from p3i.paint.fill.cutout import Cutout, cutout, doubts
 from p3i.paint.fill.filled import share_text
 from p3i.paint.fill.holes import marked, on_flat
-from p3i.paint.fill.pieces import cells_on
 from p3i.paint.fill.sampled import Levels
 from p3i.place.continued import followed
 from p3i.place.flat import flat_of
@@ -132,9 +131,7 @@ def edit(
         whole = dataclasses.replace(whole, photo=dataclasses.replace(whole.photo, valid=valid))
     wanted = flat.laid(placed(_with_camera(new, old), photo, focal_mm=_focal(new, flat.placed, asked)))
     if len(whole.more.index):
-        where = dataclasses.replace(flat.placed, index=whole.more.index, points=whole.more.points)
-        over = cells_on(where, most_px=4 * (where.size.width + where.size.height)) > 0
-        wanted = followed(wanted, whole.more, over).joined(wanted)
+        wanted = followed(wanted, whole.laid, whole.more).joined(wanted)
     pixels, touched, counts, notes = _laid_anew(whole, wanted, asked)
     # A bent photo is edited where it is straight, and what was touched is bent back.
     bare, touched = flat.bent_mask(whole.bare) & hole, flat.bent_mask(touched, least=0)

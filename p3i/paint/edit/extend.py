@@ -172,7 +172,9 @@ def extend(
     np.copyto(pixels[inside], flat.photo.pixels[corner], where=clear[:, :, None])
     bare[inside] &= ~clear
     shown[inside] |= clear
-    kept = kept_sides(bare, sides, size) if asked.beyond == "crop" else sides
+    added = bare.copy()
+    added[_window(sides, photo.size)] = False  # what was hidden in the photo is no reason not to grow
+    kept = kept_sides(added, sides, size) if asked.beyond == "crop" else sides
     if kept != sides:
         off = (sides[0] - kept[0], sides[1] - kept[1], sides[2] - kept[2], sides[3] - kept[3])
         window = _window(off, grown(photo.size, kept))
