@@ -190,7 +190,7 @@ def test_what_is_hidden_in_the_photo_is_filled_as_well() -> None:
     ):
         assert np.abs(found.pixels[:, :360] - given.pixels)[hole].mean() * 255 < 5
         assert np.array_equal(found.pixels[:, :360][~hole], given.pixels[~hole])
-        assert found.filled == found.record()["filled"] == hole.sum() and found.alpha is None
+        assert found.filled == found.record()["filled"] == hole.sum() and found.paint().alpha is None
 
 
 def test_what_was_transparent_stays_so_where_the_pattern_does_not_go_on() -> None:
