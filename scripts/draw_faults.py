@@ -88,9 +88,7 @@ def middle(photo: Image, program: p3i.Program) -> tuple[int, int]:
     return i, j
 
 
-def around(
-    path: Path, photo: Image, pixels: np.ndarray, program: p3i.Program, one: tuple[int, int]
-) -> None:
+def around(path: Path, photo: Image, pixels: np.ndarray, program: p3i.Program, one: tuple[int, int]) -> None:
     """What lies around an object, before and after."""
     laid = placed(program, photo)
     centers = laid.centers_px()[0]

@@ -308,8 +308,8 @@ def _program(program: Program, wide: Placed, more: Continued, sides: Sides, old:
 def _border_note(border: Sides) -> str:
     where = ", ".join(f"{name} {px}" for name, px in zip(SIDES, border, strict=True) if px)
     return (
-        f"what lies along the photo's edge is not like its pattern ({where} pixels): it stays, and takes no part "
-        "in what is added; a border is best cropped off first"
+        f"what lies along the photo's edge is not like its pattern ({where} pixels): it stays, and takes no "
+        "part in what is added; a border is best cropped off first"
     )
 
 

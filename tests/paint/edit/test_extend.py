@@ -198,7 +198,9 @@ def test_what_was_transparent_stays_so_where_the_pattern_does_not_go_on() -> Non
     photo = drawn(text)
     valid = np.ones_like(photo.valid)
     valid[150:200, :20] = False  # beside the pattern
-    found = extend(dataclasses.replace(photo, valid=valid), loads(text), by=Margins(0, 0, 0, 10), beyond="continue")
+    found = extend(
+        dataclasses.replace(photo, valid=valid), loads(text), by=Margins(0, 0, 0, 10), beyond="continue"
+    )
     assert found.alpha is not None and (found.alpha[150:200, :20] == 0).all() and found.filled == 0
 
 
