@@ -49,6 +49,13 @@ PhotoFocal = Annotated[
 ]
 """The field `focal_mm` of every record for a program on its photo."""
 
+KeepTransparent = Annotated[
+    bool,
+    "Leave what is transparent as it is; by default the pattern goes on there.",
+    Spelt("--keep-transparent"),
+]
+"""The field `keep_transparent` of the records that take holes in a photo for hidden ground."""
+
 
 @cache
 def fields_of(record: type) -> Mapping[str, Field]:

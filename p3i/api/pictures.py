@@ -188,15 +188,8 @@ def inpaint(
     asked = changed(options or InpaintOptions(), changes, verb="inpaint")
     from p3i.paint.fill.inpaint import inpaint as fill
 
-    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
-    if isinstance(mask, str | os.PathLike):
-        from p3i.vision.image import read_mask
-
-        mask = read_mask(mask, image.size)  # once: it may come from standard input, and is needed twice
-    seen = without(image, mask=mask, roi=None) if program is None else image
-    _, found = photo_and_program(seen, program, config, progress=progress)
-    image = doubted(image, found, photo)
-    return fill(image, found, asked, mask=mask, restore=restore, remove=remove, progress=progress)
+    image, found, hole = _hidden(photo, program, mask, config, progress)
+    return fill(image, found, asked, mask=hole, restore=restore, remove=remove, progress=progress)
 
 
 def find_marred(
@@ -227,21 +220,23 @@ def extend(
     program: Program | str | os.PathLike[str] | None = None,
     options: ExtendOptions | None = None,
     *,
+    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
     config: SearchConfig | None = None,
     progress: Progress | None = None,
     **changes: Any,
 ) -> "Extended":
     """`photo` continued beyond its frame by `program`, or by the one that `synth` finds.
 
-    `changes` are fields of ExtendOptions, such as `by=parse_margins("10%,0,10%,0")`. The result has `pixels`,
-    `margins`, `paint()`, `save(path)`, `program`, `record()` and `notes`. Raises FileError, ParseError,
-    UsageError where the picture would reach the horizon, ProgramError and NoPatternError.
+    What `mask` marks, as `inpaint` takes it, and what is transparent, is filled as well. `changes` are fields
+    of ExtendOptions, such as `by=parse_margins("10%,0,10%,0")`. The result has `pixels`, `margins`,
+    `paint()`, `save(path)`, `program`, `record()` and `notes`. Raises FileError, ParseError, UsageError where
+    the picture would reach the horizon, ProgramError and NoPatternError.
     """
     asked = changed(options or ExtendOptions(), changes, verb="extend")
     from p3i.paint.edit.extend import extend as continue_photo
 
-    image, found = photo_and_program(photo, program, config, progress=progress)
-    return continue_photo(image, found, asked, progress=progress)
+    image, found, hidden = _hidden(photo, program, mask, config, progress)
+    return continue_photo(image, found, asked, mask=hidden, progress=progress)
 
 
 def edit(
@@ -250,22 +245,45 @@ def edit(
     new: Program | str | os.PathLike[str],
     options: EditOptions | None = None,
     *,
+    mask: "str | os.PathLike[str] | np.ndarray | None" = None,
     config: SearchConfig | None = None,
     progress: Progress | None = None,
     **changes: Any,
 ) -> "Edited":
     """`photo` with the objects of the program `old` laid anew as the program `new` says.
 
-    Where `old` is None, it is the program that `synth` finds. `changes` are fields of EditOptions. The result
-    has `pixels`, `touched`, `kept`, `removed`, `added`, `paint()`, `save(path)` and `notes`. Raises
-    FileError, ParseError, UsageError, ProgramError for a program without objects, and NoPatternError.
+    Where `old` is None, it is the program that `synth` finds. What `mask` marks, as `inpaint` takes it, and
+    what is transparent, is filled first, and both programs go on over it. `changes` are fields of
+    EditOptions. The result has `pixels`, `touched`, `kept`, `removed`, `copied`, `filled`, `added`,
+    `paint()`, `save(path)` and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program
+    without objects, and NoPatternError.
     """
     asked = changed(options or EditOptions(), changes, verb="edit")
     from p3i.paint.edit.edit import edit as lay_anew
 
     wanted = _in_memory(new)
-    image, found = photo_and_program(photo, old, config, progress=progress)
-    return lay_anew(image, found, wanted, asked)
+    image, found, hidden = _hidden(photo, old, mask, config, progress)
+    return lay_anew(image, found, wanted, asked, mask=hidden, progress=progress)
+
+
+def _hidden(
+    photo: "str | os.PathLike[str] | Image",
+    program: Program | str | os.PathLike[str] | None,
+    mask: "str | os.PathLike[str] | np.ndarray | None",
+    config: SearchConfig | None,
+    progress: Progress | None,
+) -> "tuple[Image, Program, np.ndarray | None]":
+    """A photo, its program, searched for outside of what is hidden where it is None, and the mask of that."""
+    if mask is None:
+        return *photo_and_program(photo, program, config, progress=progress), None
+    image = read_image(photo) if isinstance(photo, str | os.PathLike) else photo
+    if isinstance(mask, str | os.PathLike):
+        from p3i.vision.image import read_mask
+
+        mask = read_mask(mask, image.size)  # once: it may come from standard input, and is needed twice
+    seen = without(image, mask=mask, roi=None) if program is None else image
+    _, found = photo_and_program(seen, program, config, progress=progress)
+    return doubted(image, found, photo), found, mask
 
 
 def _in_memory(program: Program | str | os.PathLike[str]) -> Program:

@@ -25,6 +25,7 @@ from p3i.options.extend import ExtendOptions, Margins, parse_margins
     ),
     options.of(ExtendOptions, "beyond", "max_px", "focal_mm"),
 )
+@grouped.group("What is hidden", inputs.mask(), options.of(ExtendOptions, "keep_transparent"))
 @targets.written(PICTURES, "Where to write the picture.")
 @options.quiet
 @options.verbose
@@ -33,15 +34,17 @@ def command(**given: Any) -> int:
     """Continue PHOTO beyond its frame: where the frame cuts the pattern of PROG, the pattern goes on.
 
     The photo's own pixels stay as they are, to the bit. The picture grows where the pattern does; --beyond
-    says what becomes of ground that is not pattern. Without PROG the program is searched for.
+    says what becomes of ground that is not pattern. What is transparent or masked is filled as well, where it
+    is pattern. Without PROG the program is searched for.
     """
     if given["by"] is not None and given["cells"] is not None:
         raise UsageError("--by and --cells both say how far: give one of them")
     by: Margins = given["by"] or given["cells"] or ExtendOptions().by
     asked = options.chosen(ExtendOptions, given, by=by)
+    mask: str | None = given["mask"]
 
     def widen(job: Job) -> batch.Answer:
-        found = api.extend(job.photo, job.program, asked, progress=job.update)
+        found = api.extend(job.photo, job.program, asked, mask=mask, progress=job.update)
         left, top, right, bottom = found.margins
         return batch.Answer(
             make=lambda: made(found.paint(), job.kind, keeps="the photo's"),
@@ -50,4 +53,4 @@ def command(**given: Any) -> int:
             more=[f"grown by {left}, {top}, {right}, {bottom} pixels, {found.added} objects added"],
         )
 
-    return each_photo(given, widen)
+    return each_photo(given, widen, alone={"--mask -": mask == "-"}, read=(mask,))

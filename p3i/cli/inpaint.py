@@ -15,9 +15,7 @@ from p3i.options.inpaint import InpaintOptions
 @inputs.words("PHOTO... [PROG]")
 @grouped.group(
     "The hole",
-    click.option(
-        "--mask", metavar="FILE", type=inputs.INPUT, help="A picture whose white pixels are filled."
-    ),
+    inputs.mask(),
     click.option(
         "--restore",
         metavar="I,J|NAME",

@@ -65,6 +65,13 @@ def words(metavar: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     return declare
 
 
+def mask() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The option --mask, which says what of a photo is hidden; the file's name arrives as `mask`."""
+    return click.option(
+        "--mask", metavar="FILE", type=INPUT, help="A picture whose white pixels are hidden ground: filled."
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Inputs:
     """The photos of a call, in order, and the programs that stood beside them."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from p3i.errors import UsageError
-from p3i.records import Spelt, check_focal
+from p3i.records import KeepTransparent, Spelt, check_focal
 
 
 def parse_scale(text: str) -> float | None:
@@ -31,6 +31,7 @@ class EditOptions:
         "closer. [default: auto]",
         Spelt(metavar="auto|S", read=parse_scale),
     ] = None
+    keep_transparent: KeepTransparent = False
     focal_mm: Annotated[
         float | None,
         "35 mm-equivalent focal length; by default that of the old program's header, else of the photo, "

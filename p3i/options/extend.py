@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from p3i.errors import UsageError
-from p3i.records import PhotoFocal, Spelt, check_focal, check_max_px
+from p3i.records import KeepTransparent, PhotoFocal, Spelt, check_focal, check_max_px
 
 SIDES = ("left", "top", "right", "bottom")
 """The sides of a picture, in the order in which margins are given."""
@@ -82,6 +82,7 @@ class ExtendOptions:
         "Where the new ground is not pattern. crop: grow only as far as it is; transparent: leave it so; "
         "continue: the photo's border goes on, smoothly; refuse: make no such picture.",
     ] = "crop"
+    keep_transparent: KeepTransparent = False
     max_px: Annotated[
         int, "Make no picture of more than N pixels (width times height).", Spelt(metavar="N")
     ] = 100_000_000

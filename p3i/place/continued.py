@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from p3i.grammar.ast import Affine, For, Polar, Program, Statement
 from p3i.interp.unroll import SLACK, Nest, nest
 from p3i.place.moves import nearest
-from p3i.place.outlines import chart_of
+from p3i.place.outlines import chart_of, pitch
 from p3i.place.placed import Placed
 from p3i.place.presence import bits_of
 from p3i.vision.image import Image, masked
@@ -38,6 +38,8 @@ _LEAST_PX = 4.0
 _LOOKS = 7
 # A line of cells is as the program has it where the photo shows this share of them wholly.
 _SEEN = 0.5
+# What lies nearer to an object than this, in distances to the next, is in its cell, if to no other nearer.
+_IN_CELL = 0.75
 # Rings whose step divides 360 up to this are closed.
 _TURN_SLACK = 0.1
 
@@ -69,6 +71,14 @@ class Continued:
     index: Index
     points: Array
     bounds: tuple[Bound, ...]
+
+    def notes(self) -> list[str]:
+        """A sentence where something goes on through a hole of the photo."""
+        count = len(self.index)
+        if not count:
+            return []
+        what = "object is" if count == 1 else "objects are"
+        return [f"the pattern goes on through the hole: {count} {what} added that the program does not draw"]
 
     def joined(self, laid: Placed) -> Placed:
         """The program with what goes on behind its own objects."""
@@ -128,9 +138,36 @@ def continued(
     if found is not None:
         bits[told] = found
     bounds = _moved(bounds, index, bits, whole)
-    index = index[free & _inside(index, bounds) & (shown.asked > 0)]
+    return _distinct(laid, index[free & _inside(index, bounds) & (shown.asked > 0)], bounds)
+
+
+def followed(laid: Placed, other: Placed, more: Continued) -> Continued:
+    """The objects that continue `laid` where `more` did `other`, another program of the same photo.
+
+    `other` ends with those that came in. Line by line beyond each bound, as far as most of a line lies in
+    cells of these: of a pattern that is yet to be laid, what the photo shows tells nothing. A program with
+    the bounds of the other goes on as far.
+    """
+    forms = tuple(_forms(nest(laid.pattern.program)))
+    everywhere = np.ones((laid.size.height, laid.size.width), bool)
+    frame = (-0.5, -0.5, laid.size.width - 0.5, laid.size.height - 0.5)
+    index = _around(_View(laid, everywhere, ~everywhere, frame))
+    index = index[_fresh(laid, index)]
     points = laid.at(index)
-    _, first = np.unique(np.rint(points * 1e3), axis=0, return_index=True)  # turns that coincide are one
+    number = nearest(other, points)
+    away = np.hypot(*(points - other.points[number]).T)
+    there = number >= len(other.index) - len(more.index)
+    there &= away < _IN_CELL * pitch(chart_of(other.pattern))
+    bounds = more.bounds
+    if forms != tuple(bound.form for bound in bounds):
+        bounds = _moved(tuple(Bound(form) for form in forms), index, np.zeros(len(index)), ~there)
+    return _distinct(laid, index[there & _inside(index, bounds)], bounds)
+
+
+def _distinct(laid: Placed, index: Index, bounds: tuple[Bound, ...]) -> Continued:
+    """What goes on, turns of a ring that coincide as one."""
+    points = laid.at(index)
+    _, first = np.unique(np.rint(points * 1e3), axis=0, return_index=True)
     first = np.sort(first)
     return Continued(index[first], points[first], bounds)
 

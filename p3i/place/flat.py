@@ -59,6 +59,12 @@ class Flat:
         at = straight_from_photo(pixel_grid(self.size), self.k1, size=self.size).numpy()
         return remapped(values, np.ones(values.shape[:2], bool), at + np.array(self.corner, np.float32))[0]
 
+    def bent_mask(self, mask: Mask, *, least: float = 0.5) -> Mask:
+        """Which photo pixels [H, W] show more than the share `least` of a flat mask [h, w]."""
+        if self.k1 is None:
+            return mask
+        return self.bent(np.repeat(mask[:, :, None], 3, 2).astype(np.float32))[:, :, 0] > least
+
 
 def flat_of(photo: Image, program: Program, *, focal_mm: float | None = None) -> Flat:
     """The photo laid flat by the header's lens_k1; raises as `placed` does."""

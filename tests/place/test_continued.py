@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from marked import drawn
 
 from p3i import loads
-from p3i.place.continued import continued
+from p3i.place.continued import continued, followed
 from p3i.place.placed import Placed, placed
 from p3i.vision.image import Image
 
@@ -142,3 +142,25 @@ def test_beyond_the_frame_nothing_goes_on_that_ends_inside_the_photo() -> None:
     laid = laid_on(photo, text)
     assert laid.in_sight().all()
     assert len(continued(laid, photo, canvas=(-100.5, -100.5, 579.5, 499.5)).index) == 0
+
+
+@pytest.mark.parametrize("text", [RECTANGLE, TRIANGLE, RING])
+def test_the_same_program_follows_itself(text: str) -> None:
+    photo, hole = drawn(text), beside(right_of=300)
+    laid = laid_on(photo, text)
+    more = continued(laid, photo, hole=hole)
+    found = followed(laid, more.joined(laid), more)
+    assert sorted(found.index.tolist()) == sorted(more.index.tolist())
+
+
+@pytest.mark.parametrize(("last", "comes"), [(2, True), (0, False)])
+def test_another_program_follows_from_the_hole_on_and_not_from_before_it(last: int, comes: bool) -> None:
+    """Every other column, up to the hole or ending long before it."""
+    photo, hole = drawn(RECTANGLE), beside(right_of=at(RECTANGLE, 2.5, 0)[0])
+    laid = laid_on(photo, RECTANGLE.replace("range(-4, 5)", "range(-4, 3)"))
+    more = continued(laid, photo, hole=hole)
+    assert len(more.index) > 5
+    sparser = RECTANGLE.replace("9*i", "18*i").replace("range(-4, 5)", f"range(-2, {last})")
+    found = followed(laid_on(photo, sparser), more.joined(laid), more)
+    assert bool(len(found.index)) == comes
+    assert (2 * found.index[:, 0] > 2).all()

@@ -4,10 +4,13 @@ An object of the new program that stands where one of the old does keeps its own
 old are removed (cleared.py); each other place of the new gets the nearest good object of the photo, cut out
 of its ground (cutout.py), turned with its ring and in the light of its new place.
 
+Ground that is hidden is filled first (fill/completed.py), and both programs go on over it.
+
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W].
 """
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -18,14 +21,19 @@ from numpy.typing import NDArray
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.edit import EditOptions
-from p3i.paint.fill.cleared import cleared, covered, local_points, object_masks, windows
-from p3i.paint.fill.cutout import Cutout, Levels, cutout, doubts
+from p3i.paint.fill.cleared import cleared, covered, hanging, local_points, object_masks, windows
+from p3i.paint.fill.completed import Completed, completed
+from p3i.paint.fill.cutout import Cutout, cutout, doubts
+from p3i.paint.fill.filled import share_text
+from p3i.paint.fill.holes import marked, on_flat
+from p3i.paint.fill.sampled import Levels
+from p3i.place.continued import followed
 from p3i.place.flat import flat_of
 from p3i.place.moves import frames, pitch_px
 from p3i.place.outlines import chart_of, pitch
 from p3i.place.placed import Placed, placed
 from p3i.records import changed
-from p3i.vision.image import Image
+from p3i.vision.image import Image, masked
 from p3i.vision.picture import Picture, opacity, repainted
 from p3i.vision.sheet import project
 
@@ -33,19 +41,24 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
+Progress = Callable[[str, float], None]
 
 # Objects this near to each other, in distances to the next, are one object.
 _SAME = 0.05
 # An object is worth copying where it is at most this many times farther from the median than a typical one.
 _GOOD = 1.5
 _GAINS = (0.6, 1.6)
+# A pixel that an object covers by as much is its own.
+_LEAST_OWN = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edited:
     """A photo with its objects laid anew: `pixels` float32 [H, W, 3], other than the photo's where `touched`.
 
-    `kept`, `removed` and `added` count the objects on the photo.
+    `kept`, `removed` and `copied` count the objects on the photo. `filled` [H, W] is hidden ground that was
+    filled first, a part of `touched`; `unlike` the share of all hidden ground for which the program knows
+    nothing like it; `added` are the (i, j) with which the old program goes on over it.
     """
 
     photo: Image
@@ -53,12 +66,20 @@ class Edited:
     touched: Mask
     kept: int
     removed: int
-    added: int
+    copied: int
+    filled: Mask
+    unlike: float = 0.0
+    added: tuple[tuple[int, int], ...] = ()
     notes: tuple[str, ...] = ()
 
     def paint(self) -> Picture:
-        """The picture in the photo's depth, as transparent as it was."""
-        return repainted(self.photo, self.pixels, alpha=opacity(self.photo))
+        """The picture in the photo's depth, as transparent as it was, but for what was filled."""
+        alpha = opacity(self.photo)
+        return repainted(
+            self.photo,
+            self.pixels,
+            alpha=None if alpha is None else np.where(self.filled, np.float32(1), alpha),
+        )
 
     def save(self, path: str | PathLike[str], *, kind: str | None = None, force: bool = False) -> None:
         """Write the picture as Picture.save does."""
@@ -70,32 +91,74 @@ class Edited:
             "photo": [self.photo.size.width, self.photo.size.height],
             "kept": self.kept,
             "removed": self.removed,
-            "added": self.added,
+            "copied": self.copied,
             "touched": round(float(self.touched.mean()), 4),
+            "filled": int(self.filled.sum()),
+            "unlike": round(self.unlike, 4),
+            "added": [list(index) for index in self.added],
+            "notes": list(self.notes),
         }
 
 
 def edit(
-    photo: Image, old: Program, new: Program, options: EditOptions | None = None, **changes: Any
+    photo: Image,
+    old: Program,
+    new: Program,
+    options: EditOptions | None = None,
+    *,
+    mask: str | PathLike[str] | Mask | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
 ) -> Edited:
     """The photo with the objects of `old` laid as `new` says; `changes` are fields of EditOptions.
 
-    The camera is that of `old` where `new` names none. Raises UsageError for options that cannot be,
-    ProgramError for a program without objects, UsageError where no object of `old` is on the photo.
+    The camera is that of `old` where `new` names none. What `mask` marks, a picture (white is hidden) or bool
+    [H, W], and what is transparent, is filled first, and both programs go on over it.
+
+    Raises UsageError for options that cannot be, ProgramError for a program without objects, UsageError where
+    no object of `old` is on the photo; for the mask as `inpaint` does.
     """
     asked: EditOptions = changed(options or EditOptions(), changes, verb="edit")
+    hidden = marked(photo, mask)
+    hole = hidden if asked.keep_transparent else hidden | ~photo.valid
     flat = flat_of(photo, old, focal_mm=asked.focal_mm)
-    laid = flat.placed
-    if not laid.in_sight().any():
+    if not flat.placed.in_sight().any():
         raise UsageError("no object of the old program lies on the photo: there is nothing to copy")
-    wanted = flat.laid(placed(_with_camera(new, old), photo, focal_mm=_focal(new, laid, asked)))
-    found = _edited(flat.photo, laid, wanted, asked)
-    if flat.k1 is None:
-        return dataclasses.replace(found, photo=photo)
+    whole = completed(flat, on_flat(flat, hole), progress=progress)
+    # What was transparent stays so where the pattern does not go on.
+    if whole.bare.any():
+        valid = whole.photo.valid & (whole.known | ~whole.bare | on_flat(flat, hidden))
+        whole = dataclasses.replace(whole, photo=dataclasses.replace(whole.photo, valid=valid))
+    wanted = flat.laid(placed(_with_camera(new, old), photo, focal_mm=_focal(new, flat.placed, asked)))
+    if len(whole.more.index):
+        wanted = followed(wanted, whole.laid, whole.more).joined(wanted)
+    pixels, touched, counts, notes = _laid_anew(whole, wanted, asked)
     # A bent photo is edited where it is straight, and what was touched is bent back.
-    touched = flat.bent(np.repeat(found.touched[:, :, None], 3, 2).astype(np.float32))[:, :, 0] > 0
-    pixels = np.where(touched[:, :, None], flat.bent(found.pixels), photo.pixels).astype(np.float32)
-    return dataclasses.replace(found, photo=photo, pixels=pixels, touched=touched)
+    bare, touched = flat.bent_mask(whole.bare) & hole, flat.bent_mask(touched, least=0)
+    pixels = flat.bent(pixels)
+    filled = hole & ~(bare & ~hidden)
+    touched = (touched & (photo.valid | filled)) | filled
+    unlike = float(bare.sum() / max(1, hole.sum()))
+    said = [f"{counts[0]} objects kept, {counts[1]} removed, {counts[2]} added", *whole.more.notes()]
+    if part := share_text(bare, hole):
+        said.append(f"for {part} the program has nothing like it: " + _what_of(bare, hidden))
+    return Edited(
+        photo,
+        np.where(touched[:, :, None], pixels, photo.pixels).astype(np.float32),
+        touched,
+        *counts,
+        filled=filled,
+        unlike=unlike,
+        added=tuple((int(i), int(j)) for i, j in whole.more.index),
+        notes=(*said, *notes),
+    )
+
+
+def _what_of(bare: Mask, hidden: Mask) -> str:
+    """What becomes of ground that is not pattern, by whether a mask hid it or it was transparent."""
+    if not (bare & ~hidden).any():
+        return "the surroundings are continued"
+    return "it stays transparent" if not (bare & hidden).any() else "what was transparent of it stays so"
 
 
 def _with_camera(new: Program, old: Program) -> Program:
@@ -109,7 +172,11 @@ def _focal(new: Program, laid: Placed, asked: EditOptions) -> float:
     return said if said is not None and asked.focal_mm is None else laid.camera.focal_mm
 
 
-def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) -> Edited:
+def _laid_anew(
+    whole: Completed, wanted: Placed, options: EditOptions
+) -> tuple[Floats, Mask, tuple[int, int, int], list[str]]:
+    """The flat photo laid anew, where it was touched, how many objects are kept, removed, copied; notes."""
+    photo, laid = whole.photo, whole.laid
     old_place, new_place = _kept(laid, wanted)
     gone = np.setdiff1d(np.arange(len(laid.index)), old_place)
     fresh = np.setdiff1d(np.arange(len(wanted.index)), new_place)
@@ -119,14 +186,15 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
         int(laid.in_sight()[gone].sum()),
         int(wanted.in_sight()[fresh].sum()),
     )
-    notes = [f"{counts[0]} objects kept, {counts[1]} removed, {counts[2]} added"]
     if not len(gone) and not len(fresh):
-        return Edited(photo, photo.pixels, touched, *counts, tuple(notes))
-    cut = cutout(laid, photo)
-    notes += doubts(cut)
+        return photo.pixels, touched, counts, []
+    # What was filled shows what the others do already, and is no object to copy.
+    cut = cutout(laid, masked(photo, ~whole.known))
+    notes = doubts(cut)
+    ground, every = cleared(photo.pixels, photo.valid, laid, cut)
     own = _mask(_only(laid, old_place), cut)
-    removed = covered(_only(laid, gone), cut) & (own < 0.02) & photo.valid
-    ground = cleared(photo.pixels, photo.valid, laid, cut)
+    removed = covered(_only(laid, gone), cut) & (own < _LEAST_OWN) & photo.valid
+    removed |= hanging(every & ~covered(laid, cut), removed)
     pixels = np.where(removed[:, :, None], ground, photo.pixels)
     scale = options.scale
     if scale is None:
@@ -136,9 +204,7 @@ def _edited(photo: Image, laid: Placed, wanted: Placed, options: EditOptions) ->
                 f"new objects are made {scale:.0%} as large, as their spacing is: --scale 1 keeps their size"
             )
     painted = _paint(pixels, ground, photo, laid, _only(wanted, fresh), cut, scale, own)
-    touched = (removed | painted) & photo.valid
-    pixels = np.where(touched[:, :, None], pixels, photo.pixels).astype(np.float32)
-    return Edited(photo, pixels, touched, *counts, tuple(notes))
+    return pixels, (removed | painted) & photo.valid, counts, notes
 
 
 def _kept(laid: Placed, wanted: Placed) -> tuple[Index, Index]:

@@ -24,8 +24,10 @@ from p3i.grammar.ast import Affine, Header, Program
 from p3i.grammar.leaves import map_affines
 from p3i.grammar.printer import format_program
 from p3i.options.extend import SIDES, Beyond, ExtendOptions
+from p3i.paint.edit.border import border_px, within
 from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
+from p3i.paint.fill.holes import marked, on_flat
 from p3i.paint.fill.pieces import cells_on
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.continued import Continued, continued, widened
@@ -62,7 +64,8 @@ class Extended:
 
     `laid` is the program on the new canvas with the objects that were added, the last `added` of them;
     `smooth` is the share of the new pixels that no object's cell covers, or for which no cell was like
-    enough: there the border is continued, or nothing is (`beyond`). `program` draws the same on the new
+    enough: there the border is continued, or nothing is (`beyond`). `filled` pixels of the photo were hidden
+    and are pattern now. `program` draws the same on the new
     canvas, None where none does.
     """
 
@@ -73,6 +76,7 @@ class Extended:
     laid: Placed
     added: int
     smooth: float
+    filled: int
     program: Program | None
     notes: tuple[str, ...] = ()
 
@@ -106,7 +110,9 @@ class Extended:
             "image_from_plane": [[float(f"{one:.10g}") for one in row] for row in self.laid.image_from_plane],
             "added": new.tolist(),
             "smooth": round(self.smooth, 4),
+            "filled": self.filled,
             "program": None if self.program is None else format_program(self.program),
+            "notes": list(self.notes),
         }
 
 
@@ -115,19 +121,24 @@ def extend(
     program: Program,
     options: ExtendOptions | None = None,
     *,
+    mask: str | PathLike[str] | Mask | None = None,
     progress: Progress | None = None,
     **changes: Any,
 ) -> Extended:
     """The photo continued beyond its frame by `program`; `changes` are fields of ExtendOptions.
 
+    What `mask` marks, a picture (white is hidden) or bool [H, W], and what is transparent, is filled as well.
+
     A photo that its lens bends (header key lens_k1) is straightened first: then its own pixels are resampled,
     and what the straight picture lacks inside the frame is filled as well.
 
-    Raises UsageError where the new picture would reach the horizon or be too large; ProgramError for a
-    program without objects.
+    Raises UsageError where the new picture would reach the horizon or be too large, for the mask as `inpaint`
+    does; ProgramError for a program without objects.
     """
     asked: ExtendOptions = changed(options or ExtendOptions(), changes, verb="extend")
     notes = list[str]()
+    hidden = marked(photo, mask)
+    hole = hidden if asked.keep_transparent else hidden | ~photo.valid
     flat = flat_of(photo, program, focal_mm=asked.focal_mm)
     if flat.k1 is not None:
         notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
@@ -143,14 +154,27 @@ def extend(
     refuse_horizon(laid, sides)
     x, y = flat.corner[0] - left - 0.5, flat.corner[1] - top - 0.5
     canvas = (x, y, x + size.width, y + size.height)
-    more = continued(flat.placed, flat.photo, hole=~flat.seen, canvas=canvas)
+    unknown = on_flat(flat, hole) | ~flat.seen
+    more = continued(flat.placed, flat.photo, hole=unknown, canvas=canvas)
     wide = _wider(more.joined(laid), sides, size)
 
-    pixels, known, shown = _laid_out(flat, sides, size)
+    pixels, known, shown = _laid_out(flat, ~unknown, sides, size)
     ground = _ground(wide)
-    pixels, bare = _painted(pixels, known & ground, ~shown & ground, wide, progress)
+    of_pattern = known & ground
+    if flat.k1 is None and any(border := border_px(flat.photo, flat.placed)):
+        of_pattern[_window(sides, photo.size)] &= within(photo.size, border)
+        notes.append(_border_note(border))
+    pixels, bare = _painted(pixels, of_pattern, ~shown & ground, wide, progress)
     bare |= ~shown & ~ground
-    kept = kept_sides(bare, sides, size) if asked.beyond == "crop" else sides
+    # What was transparent stays so where the pattern does not go on.
+    inside, corner = _window(sides, flat.size), _window(flat.corner, flat.size)
+    clear = bare[inside] & ~(flat.photo.valid | on_flat(flat, hidden))[corner] & flat.seen[corner]
+    np.copyto(pixels[inside], flat.photo.pixels[corner], where=clear[:, :, None])
+    bare[inside] &= ~clear
+    shown[inside] |= clear
+    added = bare.copy()
+    added[_window(sides, photo.size)] = False  # what was hidden in the photo is no reason not to grow
+    kept = kept_sides(added, sides, size) if asked.beyond == "crop" else sides
     if kept != sides:
         off = (sides[0] - kept[0], sides[1] - kept[1], sides[2] - kept[2], sides[3] - kept[3])
         window = _window(off, grown(photo.size, kept))
@@ -165,6 +189,7 @@ def extend(
         raise UsageError(
             f"{smooth:.0%} of the new pixels would not be pattern: grow by less, or choose another --beyond"
         )
+    filled = int((~shown & ~bare)[_window(kept, photo.size)].sum())
     alpha = _alpha(photo if flat.k1 is None else None, known, shown, kept)
     if asked.beyond == "transparent" and bare.any():
         alpha = np.where(bare, np.float32(0), np.float32(1) if alpha is None else alpha)
@@ -177,7 +202,7 @@ def extend(
             "look at what was added: the photo's objects differ much from one another, and mixtures of them "
             "look like ghosts"
         )
-    return Extended(photo, pixels, alpha, kept, wide, len(more.index), smooth, wider, tuple(notes))
+    return Extended(photo, pixels, alpha, kept, wide, len(more.index), smooth, filled, wider, tuple(notes))
 
 
 def _painted(
@@ -217,10 +242,11 @@ def _ground(wide: Placed) -> Mask:
     return cells_on(wide, most_px=4 * (wide.size.width + wide.size.height)) > 0
 
 
-def _laid_out(flat: Flat, sides: Sides, size: Size) -> tuple[Floats, Mask, Mask]:
+def _laid_out(flat: Flat, seen: Mask, sides: Sides, size: Size) -> tuple[Floats, Mask, Mask]:
     """The photo on the new canvas: pixels [H, W, 3], which of them are known, and which it shows at all.
 
-    What a bent photo shows beyond its old frame counts where it is known.
+    `seen` [h, w] is what the flat photo shows inside its frame, transparent or not. What a bent photo shows
+    beyond its old frame counts where it is known.
     """
     pixels = np.zeros((size.height, size.width, 3), np.float32)
     known, shown = np.zeros((2, size.height, size.width), bool)
@@ -235,13 +261,8 @@ def _laid_out(flat: Flat, sides: Sides, size: Size) -> tuple[Floats, Mask, Mask]
     to, of = tuple(into), tuple(out_of)
     pixels[to] = flat.photo.pixels[of]
     known[to] = flat.photo.valid[of]
-    shown[to] = flat.seen[of] & flat.photo.valid[of]
-    inside = _window(sides, flat.size)
-    corner = (
-        slice(flat.corner[1], flat.corner[1] + flat.size.height),
-        slice(flat.corner[0], flat.corner[0] + flat.size.width),
-    )
-    shown[inside] = flat.seen[corner]
+    shown[to] = seen[of] & flat.photo.valid[of]
+    shown[_window(sides, flat.size)] = seen[_window(flat.corner, flat.size)]
     return pixels, known & shown, shown
 
 
@@ -252,12 +273,12 @@ def _alpha(photo: Image | None, known: Mask, shown: Mask, sides: Sides) -> Float
         return None if (known | ~shown).all() else (known | ~shown).astype(np.float32)
     wide = np.ones(known.shape, np.float32)
     wide[_window(sides, photo.size)] = own
-    return wide
+    return np.where(shown, wide, np.float32(1))
 
 
-def _window(sides: Sides, size: Size) -> tuple[slice, slice]:
-    """Where the photo lies in the new picture: rows and columns."""
-    return slice(sides[1], sides[1] + size.height), slice(sides[0], sides[0] + size.width)
+def _window(corner: tuple[int, ...], size: Size) -> tuple[slice, slice]:
+    """The rows and columns of a picture of `size` whose corner lies at (left, top, ...) of a larger one."""
+    return slice(corner[1], corner[1] + size.height), slice(corner[0], corner[0] + size.width)
 
 
 def _program(program: Program, wide: Placed, more: Continued, sides: Sides, old: Size) -> Program | None:
@@ -282,6 +303,14 @@ def _program(program: Program, wide: Placed, more: Continued, sides: Sides, old:
         canvas=(wide.size.width, wide.size.height), focal_mm=round(wide.camera.focal_mm * ratio, 6)
     )
     return map_affines(dataclasses.replace(drawn, header=header), change)
+
+
+def _border_note(border: Sides) -> str:
+    where = ", ".join(f"{name} {px}" for name, px in zip(SIDES, border, strict=True) if px)
+    return (
+        f"what lies along the photo's edge is not like its pattern ({where} pixels): it stays, and takes no "
+        "part in what is added; a border is best cropped off first"
+    )
 
 
 def _cropped_note(asked: Sides, kept: Sides) -> list[str]:

@@ -9,7 +9,9 @@ objects are not copied to where none does; where no move lays an object wholly o
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool or float32 [H, W].
 """
 
+import dataclasses
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -22,6 +24,7 @@ from p3i.paint.fill.pieces import padded
 from p3i.place.moves import frames, nearest_px, pitch_px
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
+from p3i.size import Size
 from p3i.vision.fill import eroded, filled
 from p3i.vision.sheet import project
 
@@ -46,6 +49,13 @@ _WHOLLY = 0.98
 _AWAY = 0.02
 # Light that is smooth over at least twice as many pixels is computed on a reduced picture.
 _FINEST_SIGMA = 4.0
+# What differs from the ground beside an object and touches it hangs on it, so far from its outline, in
+# distances: as the outline of an object that is shifted or larger does.
+_HANGS_ON = 0.08
+# What is told and filled at an object is told from what lies within so many cells of it, or so many pixels.
+_REACH, _LEAST_REACH_PX = 2.0, 16.0
+# Grain is told from no more than so many pixels a side.
+_SAMPLE_PX = 1536
 # Rows of the photo whose texture is looked up at once.
 _STRIP = 512
 # A cell's ground reaches this far beyond its border, in distances, where no other cell has it.
@@ -119,43 +129,121 @@ def covered(placed: Placed, cut: Cutout) -> Mask:
 
 def cleared(
     pixels: Floats, valid: Mask, placed: Placed, cut: Cutout, *, objects: Mask | None = None
-) -> Floats:
-    """The photo with the ground of the pattern's cells continued under `objects` [H, W]: float32 [H, W, 3].
+) -> tuple[Floats, Mask]:
+    """The photo with the ground of the pattern's cells continued under `objects` [H, W], and where it was.
 
-    By default under all. The ground is what none of the pattern's objects covers.
+    float32 [H, W, 3] and bool [H, W], by default under all objects. The ground is what none of the pattern's
+    objects covers. What hangs on an object beyond its outline goes with it. Nothing farther than two cells
+    from the objects is looked at: a large photo takes no longer than its part around them.
     """
     every = covered(placed, cut)
     wanted = every if objects is None else objects
+    result, gone = pixels.copy(), np.zeros_like(wanted)
+    for window, own in _apart(wanted, placed):
+        near = _cropped(placed, window)
+        gone[window] |= _clear(result[window], valid[window], near, cut, every[window], own)
+    return result, gone & valid
+
+
+def _clear(pixels: Floats, valid: Mask, placed: Placed, cut: Cutout, every: Mask, wanted: Mask) -> Mask:
+    """Do with a part of the photo what `cleared` says, in place, and say where."""
     expected, within = _expected(placed, cut)
     ground = valid & ~every & within
-    if not ground.any() or not wanted.any():
-        return pixels
-    sigma = max(1.0, _BLUR * _pitch_px(placed))
-    expected *= _gain(pixels, expected, ground, sigma=4 * sigma)
-    off = np.subtract(pixels, expected)
-    detail = off - _even(off, ground, sigma=sigma)
+    if not ground.any():
+        return np.zeros_like(wanted)
+    pitch_here = _pitch_px(placed)
+    sigma = max(1.0, _BLUR * pitch_here)
+    wide, fine = _Even.of(ground, sigma=4 * sigma), _Even.of(ground, sigma=sigma)
+    # Channel by channel, and in place: a large photo's copies are much.
+    for channel in range(3):
+        here, there = wide.smooth(pixels[:, :, channel]), wide.smooth(expected[:, :, channel])
+        expected[:, :, channel] *= np.clip((here + 0.02) / (there + 0.02), *_GAINS)
+    detail = np.empty_like(expected)
+    for channel in range(3):
+        off = pixels[:, :, channel] - expected[:, :, channel]
+        np.subtract(off, fine.smooth(off), out=detail[:, :, channel])
     typical = _typical(detail, ground)
-    result = pixels.copy()
-    for rows, columns, inside, spacing in _holes(wanted, placed):
+    beside = cv2.dilate(wanted.astype(np.uint8), _disc(_HANGS_ON * pitch_here)) > 0
+    gone = wanted | hanging(ground & ~typical & beside, wanted)
+    for rows, columns, inside, spacing in _holes(gone, placed):
         # What its own rim shows, but for other things there, if there is more than them.
-        for beside in (typical, ground, valid & ~every):
+        for beside in (typical, ground & ~gone, valid & ~every & ~gone):
             rim = rim_of(inside, beside[rows, columns], reach_px=_RIM_PX)
             if rim.any():
                 break
-        lacking = carried(off[rows, columns] * rim[:, :, None], rim.astype(np.float32), spacing_px=spacing)
-        np.copyto(result[rows, columns], expected[rows, columns] + lacking, where=(inside > 0)[:, :, None])
-    inner = eroded(typical, max(1, round(_AWAY * _pitch_px(placed))))
+        off = (pixels[rows, columns] - expected[rows, columns]) * rim[:, :, None]
+        lacking = carried(off, rim.astype(np.float32), spacing_px=spacing)
+        np.copyto(pixels[rows, columns], expected[rows, columns] + lacking, where=(inside > 0)[:, :, None])
+    del expected
+    inner = eroded(typical & ~gone, max(1, round(_AWAY * pitch_here)))
     inner = inner if inner.any() else typical
     moves = [_move(placed, each) for each in _steps_to_ground(placed, cut)]
-    noise = Grain.of(detail, inner, most_px=sigma)
+    noise: Grain | None = None
     # In strips: what is looked up for each pixel takes more memory than the photo.
-    for start in range(0, len(wanted), _STRIP):
+    for start in range(0, len(gone), _STRIP):
         rows = slice(start, start + _STRIP)
-        if wanted[rows].any():
-            texture, bare = _texture(detail, inner, moves, wanted[rows], top=start)
-            texture[bare] = noise.drawn(bare, seed=start)[bare]
-            result[rows] += texture
-    return np.clip(result, 0, 1, out=result)
+        if gone[rows].any():
+            texture, bare = _texture(detail, inner, moves, gone[rows], top=start)
+            if bare.any():
+                if noise is None:
+                    some = _fullest(inner)
+                    noise = Grain.of(detail[some], inner[some], most_px=sigma)
+                texture[bare] = noise.drawn(bare, seed=start)[bare]
+            texture[~gone[rows]] = 0
+            pixels[rows] += texture
+    for channel in range(3):
+        plane = pixels[:, :, channel]
+        np.copyto(plane, np.clip(plane, 0, 1), where=gone)
+    return gone
+
+
+def _apart(wanted: Mask, placed: Placed) -> list[tuple[tuple[slice, slice], Mask]]:
+    """What of a mask [H, W] can be told and filled apart: rows and columns, and the part in these.
+
+    About each part lie two cells, from which it is told and filled.
+    """
+    cells, front = project(placed.image_from_plane, polygons(chart_of(placed.pattern), placed.index))
+    low, high, front = cells.min(1), cells.max(1), front.all(1)
+    stats = cv2.connectedComponentsWithStats(wanted.astype(np.uint8), connectivity=8)[2]
+    around = np.zeros(wanted.shape, np.uint8)
+    for x, y, width, height, _ in stats[1:].tolist():
+        near = front & (high >= (x, y)).all(1) & (low <= (x + width, y + height)).all(1)
+        reach = int(np.ceil(_REACH * (high - low)[near].max(initial=_LEAST_REACH_PX)))
+        around[max(0, y - reach) : y + height + reach, max(0, x - reach) : x + width + reach] = 1
+    labels, boxes = cv2.connectedComponentsWithStats(around, connectivity=4)[1:3]
+    found = []
+    for label, (x, y, width, height, _) in enumerate(boxes[1:].tolist(), start=1):
+        window = (slice(y, y + height), slice(x, x + width))
+        found.append((window, wanted[window] & (labels[window] == label)))
+    return found
+
+
+def _cropped(placed: Placed, window: tuple[slice, slice]) -> Placed:
+    """The program on a part of its photo."""
+    rows, columns = window
+    shift = np.array([[1.0, 0, -columns.start], [0, 1, -rows.start], [0, 0, 1]])
+    size = Size(columns.stop - columns.start, rows.stop - rows.start)
+    return dataclasses.replace(placed, size=size, image_from_plane=shift @ placed.image_from_plane)
+
+
+def hanging(other: Mask, wanted: Mask) -> Mask:
+    """The parts of a mask [H, W] that touch what is wanted [H, W]: a rim or shadow beyond its outline."""
+    count, parts = cv2.connectedComponents((other | wanted).astype(np.uint8), connectivity=8)
+    labels, touching = np.asarray(parts, np.int32), np.zeros(count, bool)
+    touching[labels[wanted]] = True
+    return other & touching[labels]
+
+
+def _disc(radius: float) -> NDArray[np.uint8]:
+    size = 2 * max(1, round(radius)) + 1
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
+
+
+def _fullest(inner: Mask) -> tuple[slice, slice]:
+    """The part of a mask, no larger than the grain of a texture needs, that holds most of it."""
+    rows, columns = (range(0, side, _SAMPLE_PX) for side in inner.shape)
+    parts = [(slice(y, y + _SAMPLE_PX), slice(x, x + _SAMPLE_PX)) for y in rows for x in columns]
+    return max(parts, key=lambda part: int(inner[part].sum()))
 
 
 def _expected(placed: Placed, cut: Cutout) -> tuple[Floats, Mask]:
@@ -172,30 +260,41 @@ def _expected(placed: Placed, cut: Cutout) -> tuple[Floats, Mask]:
     return shown, deepest > 0
 
 
-def _gain(pixels: Floats, expected: Floats, ground: Mask, *, sigma: float) -> Floats:
-    """How much lighter the photo's ground is than what is expected, smooth over `sigma` pixels: [H, W, 3]."""
-    here, there = (_even(each, ground, sigma=sigma) for each in (pixels, expected))
-    return np.clip((here + 0.02) / (there + 0.02), *_GAINS).astype(np.float32)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Even:
+    """How a ground [H, W] is made smooth over `sigma` pixels of a picture that is `reduce` times smaller.
 
-
-def _even(values: Floats, ground: Mask, *, sigma: float) -> Floats:
-    """The ground's values [H, W, 3] smooth over `sigma` pixels, and those of the nearest where it is none.
-
-    What is that smooth is known from a reduced picture as well.
+    What is that smooth is known from a reduced picture as well. `spread` is how much of what is around a
+    place of that is ground.
     """
-    height, width = ground.shape
-    reduce = 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
-    known, weight = np.where(ground[:, :, None], values, np.float32(0)), ground.astype(np.float32)
-    if reduce > 1:
-        size = (max(1, -(-width // reduce)), max(1, -(-height // reduce)))
-        known, weight = (cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in (known, weight))
-        sigma = sigma * size[0] / width
-    spread = cv2.GaussianBlur(weight, (0, 0), sigma)
-    even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(spread, 1e-4)[:, :, None]
-    even = filled(np.asarray(even, np.float32), spread > _LEAST_SPREAD)
-    if reduce > 1:
-        even = cv2.resize(even, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(even, np.float32)
+
+    ground: Mask
+    reduce: int
+    sigma: float
+    spread: Floats
+
+    @classmethod
+    def of(cls, ground: Mask, *, sigma: float) -> "_Even":
+        reduce = 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
+        weight = _reduced(ground.astype(np.float32), reduce)
+        sigma = sigma * weight.shape[1] / ground.shape[1]
+        return cls(ground, reduce, sigma, np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma), np.float32))
+
+    def smooth(self, values: Floats) -> Floats:
+        """The ground's values [H, W] made smooth, and those of the nearest where it is none."""
+        known = _reduced(np.where(self.ground, values, np.float32(0)), self.reduce)
+        even = cv2.GaussianBlur(known, (0, 0), self.sigma) / np.maximum(self.spread, 1e-4)
+        even = filled(np.asarray(even, np.float32)[:, :, None], self.spread > _LEAST_SPREAD)[:, :, 0]
+        if self.reduce > 1:
+            even = cv2.resize(even, values.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        return np.asarray(even, np.float32)
+
+
+def _reduced(values: Floats, reduce: int) -> Floats:
+    if reduce == 1:
+        return values
+    size = tuple(max(1, -(-side // reduce)) for side in values.shape[::-1])
+    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _holes(wanted: Mask, placed: Placed) -> Iterator[tuple[slice, slice, NDArray[np.uint8], float]]:
@@ -210,7 +309,9 @@ def _holes(wanted: Mask, placed: Placed) -> Iterator[tuple[slice, slice, NDArray
 
 def _typical(detail: Floats, ground: Mask) -> Mask:
     """Where `detail` [H, W, 3] is texture of the ground, not another thing that lies on it: [H, W]."""
-    size = np.abs(detail).max(2)
+    size = np.abs(detail[:, :, 0])
+    for channel in (1, 2):
+        np.maximum(size, np.abs(detail[:, :, channel]), out=size)
     # The median of the absolute deviation, as one of a normal distribution.
     limit = _MOST_DEVIATIONS * 1.4826 * float(np.median(size[ground])) + 1 / 255
     other = cv2.dilate(((size > limit) & ground).astype(np.uint8), np.ones((3, 3), np.uint8))

@@ -17,24 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.grid import Straight
-from p3i.paint.fill.through import continued, through
-from p3i.place.moves import frames
+from p3i.paint.fill.sampled import REACH, SIDE, sampled_cells
+from p3i.paint.fill.through import continuations, through
 from p3i.place.outlines import chart_of, pitch
 from p3i.place.placed import Placed
 from p3i.vision.cells import median_cell
 from p3i.vision.fill import filled
 from p3i.vision.image import Image
 from p3i.vision.lab import lab_of
-from p3i.vision.sheet import project
 from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-_SIDE = 65
-# The grid reaches this far from the object, in distances between objects.
-_REACH = 0.75
 _MOST_CELLS = 60
 # The ground is what lies this near to the border between cells, in distances between objects.
 _BORDER = 0.07
@@ -48,6 +44,9 @@ _LEAST_SHARE, _MOST_SHARE = 0.01, 0.92
 _STRAIGHT, _CROSSED = 0.8, 0.5
 _FAINT = 0.5  # in Lab: less than this is explained by any
 _TOLD = 0.6  # of a cell, at least, is ground
+# Ratios of colours are those of colours so much lighter: black has none. So many places of the grid and more
+# must show the same thing twice to tell how light rises.
+_DARK, _LEAST_SHARED = 0.02, 8
 # What hangs on an object and differs from its ground by so much goes with it: the least that an eye sees, in
 # Lab (Mahy, van Eycken and Oosterlinck, Color Research and Application 1994), and so many deviations.
 _JUST_SEEN = 2.3
@@ -66,28 +65,6 @@ _ASSUMED = 0.36
 # leave less room than this up to their cell's border, the ground must be more even still.
 _MOST_UNEVEN, _MOST_UNLIKE = 0.35, 0.6
 _LEAST_ROOM, _MOST_UNEVEN_THERE = 0.06, 0.17
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Levels:
-    """A picture float32 [H, W, 3] and its halves, so that it can be read where it is shrunk."""
-
-    pictures: tuple[Floats, ...]
-
-    @classmethod
-    def of(cls, pixels: Floats) -> "Levels":
-        """The picture down to a side of about 32 pixels."""
-        found = [pixels]
-        while min(found[-1].shape[:2]) >= 64:
-            found.append(np.asarray(cv2.pyrDown(found[-1]), np.float32))
-        return cls(tuple(found))
-
-    def read(self, at: NDArray, shrink: float) -> Floats:
-        """The colours [K, 3] at pixels [K, 2], read `shrink` pixels apart."""
-        level = int(np.clip(np.round(np.log2(max(shrink, 1e-6)) + 0.2), 0, len(self.pictures) - 1))
-        return taken(
-            self.pictures[level], np.asarray(at, float) / 2**level, sharp=level == 0 and shrink < 0.8
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,39 +114,6 @@ class Cutout:
         return taken(self.alpha if layer is None else layer, at) * inside
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sampled:
-    """The cells of all objects as the photo has them: `cells` [M, side, side, 3], `seen` [M, side, side].
-
-    `own` [side, side] is how far inside its own cell a place lies, in distances, `step` that of places in
-    program units, `places` how many there are from an object to the next.
-    """
-
-    cells: Floats
-    seen: Mask
-    own: Array
-    step: float
-    places: float
-
-
-def sampled_cells(placed: Placed, photo: Image) -> Sampled:
-    """The cells of all objects of a straight photo."""
-    spacing = pitch(chart_of(placed.pattern))
-    local, step = _grid(spacing)
-    cells, seen = _cells(placed, photo, local)
-    shape = (len(cells), _SIDE, _SIDE)
-    own = _own_ground(placed, local, spacing)
-    return Sampled(cells.reshape(*shape, 3), seen.reshape(shape), own, step, spacing / step)
-
-
-def _grid(spacing: float) -> tuple[Array, float]:
-    """The grid's places [K, 2] about an object, in program units, and how far they are apart."""
-    half = (_SIDE - 1) // 2
-    step = _REACH * spacing / half
-    line = (np.arange(_SIDE) - half) * step
-    return np.stack(np.meshgrid(line, line), -1).reshape(-1, 2).astype(np.float64), step
-
-
 def doubts(cut: Cutout) -> list[str]:
     """A sentence where what was cut out, or the ground that replaces it, is not to be relied on."""
     if not cut.clear:
@@ -187,28 +131,29 @@ def doubts(cut: Cutout) -> list[str]:
 def cutout(placed: Placed, photo: Image) -> Cutout:
     """The object that the cells of `placed` on its straight photo have in common."""
     spacing = pitch(chart_of(placed.pattern))
-    local, step = _grid(spacing)
-    own = _own_ground(placed, local, spacing)
-    cells, seen = _cells(placed, photo, local)
+    sampled = sampled_cells(placed, photo)
+    own, step = sampled.own, sampled.step
+    cells, seen = sampled.cells.reshape(len(placed.index), -1, 3), sampled.seen.reshape(len(placed.index), -1)
     whole = seen[:, own.ravel() > 0].mean(1) > 0.98
     some = np.flatnonzero(whole)
     if not len(some):
         some = np.argsort(-seen.mean(1))[:1]
     chosen = some[np.linspace(0, len(some) - 1, min(len(some), _MOST_CELLS)).astype(int)]
     cells = _evened(cells, seen & (own.ravel() > 0), chosen)
-    stacked = cells.transpose(0, 2, 1).reshape(-1, 3, _SIDE, _SIDE)
-    middle, spread = median_cell(stacked, seen.reshape(-1, _SIDE, _SIDE), chosen)
+    stacked = cells.transpose(0, 2, 1).reshape(-1, 3, SIDE, SIDE)
+    middle, spread = median_cell(stacked, seen.reshape(-1, SIDE, SIDE), chosen)
     mean = np.ascontiguousarray(middle.transpose(1, 2, 0))
     apart = np.abs(cells - mean.reshape(-1, 3)).mean(2) * seen
     misfit = np.where(whole, apart[:, own.ravel() > 0].mean(1), np.inf)
-    straight = Straight.of(placed, side=_SIDE, step=step)
-    flat, flat_own = straight.laid(mean), straight.laid(own.astype(np.float32))
+    straight = Straight.of(placed, side=SIDE, step=step)
+    flat, flat_own = straight.laid(_level(mean, placed, step)), straight.laid(own.astype(np.float32))
     along, found = _segmented(
         flat, straight.laid(spread.transpose(1, 2, 0)).mean(2), flat_own, straight.directions
     )
     clear = found is not None
     if found is None:
-        reach = np.hypot(local[:, 0], local[:, 1]).reshape(_SIDE, _SIDE)
+        y, x = (np.mgrid[:SIDE, :SIDE] - (SIDE - 1) // 2) * step
+        reach = np.hypot(x, y)
         disc = np.clip((_ASSUMED * spacing - reach) / (0.05 * spacing) + 0.5, 0, 1).astype(np.float32)
         found = straight.laid(disc), straight.laid(disc) > 0
     thing, with_it = found
@@ -218,7 +163,7 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     # Lines go on, and where all of the ground runs along one direction, it does so under the object.
     flat_ground = through(flat, known, with_it, straight.directions)
     if along is not None:
-        flat_ground = np.where(with_it[:, :, None], continued(flat, known, along[None])[1], flat_ground)
+        flat_ground = np.where(with_it[:, :, None], continuations(flat, known, along[None])[1], flat_ground)
     ground = straight.bent(flat_ground)
     # A soft edge, two places wide, within the cell.
     within = np.clip(own * spacing / step + 1, 0, 1)
@@ -229,6 +174,32 @@ def cutout(placed: Placed, photo: Image) -> Cutout:
     contrast = float(mean[own > 0].std(axis=0).mean())
     unlike = float(np.median(misfit[whole])) / max(contrast, 1e-6) if whole.sum() > 1 else 0.0
     return Cutout(alpha, gone, mean, ground, own, step, misfit, clear, room, uneven, unlike)
+
+
+def _level(mean: Floats, placed: Placed, step: float) -> Floats:
+    """The median cell without light that rises over the photo: what stands one step apart is the same.
+
+    Only of a lattice; the light, linear in logarithms, is told by where the grid shows a place and its like.
+    """
+    if placed.basis is None:
+        return mean
+    middle = placed.index[np.argmin(np.hypot(*(placed.points - np.median(placed.points, 0)).T))]
+    around = np.stack(np.meshgrid(*[np.arange(-2, 3)] * 2), -1).reshape(-1, 2)
+    steps = (placed.at(middle + around) - placed.at(middle[None])) / step
+    logs, slopes, rises = np.log(np.maximum(mean, 0) + np.float32(_DARK)), [], []
+    for x, y in np.rint(steps).astype(int)[len(steps) // 2 + 1 :]:
+        if max(abs(x), abs(y)) > SIDE - _LEAST_SHARED:
+            continue
+        here = logs[max(0, -y) : SIDE - max(0, y), max(0, -x) : SIDE - max(0, x)]
+        there = logs[max(0, y) : SIDE + min(0, y), max(0, x) : SIDE + min(0, x)]
+        slopes.append((x, y))
+        rises.append(np.median((there - here).reshape(-1, 3), axis=0))
+    if np.linalg.matrix_rank(np.array(slopes).reshape(-1, 2)) < 2:
+        return mean
+    slope = np.linalg.lstsq(np.array(slopes, float), np.array(rises), rcond=None)[0]
+    y, x = np.mgrid[:SIDE, :SIDE] - (SIDE - 1) // 2
+    rise = np.stack([x, y], -1) @ slope
+    return np.asarray((mean + _DARK) * np.exp(-rise) - _DARK, np.float32)
 
 
 def _unevenness(mean: Floats, thing: Floats, own: Floats, along: Array | None) -> float:
@@ -250,48 +221,6 @@ def _unevenness(mean: Floats, thing: Floats, own: Floats, along: Array | None) -
     return float(np.linalg.norm(ground.std(0))) / max(apart, 1e-6)
 
 
-def _own_ground(placed: Placed, local: Array, spacing: float) -> Array:
-    """How far inside its own cell each place [K] lies, in distances to the next object: [side, side].
-
-    The border is half way to the nearest other objects, drawn or not drawn, of an object in the middle.
-    """
-    chosen = np.argmin(np.hypot(*(placed.points - np.median(placed.points, 0)).T))
-    frame = frames(placed)[chosen]
-    points = local @ frame[:2, :2].T + frame[:2, 2]
-    index = placed.index[chosen]
-    near = index + np.stack(np.meshgrid([-2, -1, 0, 1, 2], [-2, -1, 0, 1, 2]), -1).reshape(-1, 2)
-    others = np.concatenate([placed.at(near), placed.points])
-    middle = placed.points[chosen]
-    others = others[np.hypot(*(others - middle).T) > 0.3 * spacing]
-    inside = np.full(len(points), np.inf)
-    for other in others:
-        away = other - middle
-        length = float(np.hypot(*away))
-        inside = np.minimum(inside, length / 2 - (points - middle) @ away / length)
-    # Single rows have no neighbours across: there the cell is as wide as it is long.
-    inside = np.minimum(inside, 0.5 * spacing * 1.2 - np.hypot(*(points - middle).T) * 0.8)
-    return (inside / spacing).reshape(_SIDE, _SIDE)
-
-
-def _cells(placed: Placed, photo: Image, local: Array) -> tuple[Floats, Mask]:
-    """The colours of all objects' cells [M, K, 3] and which places are known [M, K]."""
-    maps = frames(placed)
-    height, width = photo.valid.shape
-    values = np.zeros((len(maps), len(local), 3), np.float32)
-    seen = np.zeros((len(maps), len(local)), bool)
-    valid = photo.valid.astype(np.float32)
-    levels = Levels.of(photo.pixels)
-    for number, frame in enumerate(maps):
-        at, front = project(placed.image_from_plane, local @ frame[:2, :2].T + frame[:2, 2])
-        inside = front & (at >= 0).all(1) & (at[:, 0] <= width - 1) & (at[:, 1] <= height - 1)
-        x, y = np.where(inside[:, None], at, 0).astype(np.float32).T.reshape(2, 1, -1)
-        apart = np.hypot(*np.diff(at.reshape(_SIDE, _SIDE, 2)[_SIDE // 2], axis=0).T)
-        shrink = float(np.median(apart))
-        values[number] = levels.read(np.stack([x[0], y[0]], 1), shrink)
-        seen[number] = inside & (cv2.remap(valid, x, y, cv2.INTER_LINEAR)[0] > 0.99)
-    return values, seen
-
-
 def _evened(cells: Floats, seen: Mask, chosen: NDArray[np.int64]) -> Floats:
     """The cells in the light of their median: each is multiplied by one gain a channel."""
     weight = seen[:, :, None].astype(np.float32)
@@ -310,7 +239,7 @@ def _segmented(
     ground = (own > -_BORDER) & (own < _BORDER)
     inner = own > 0
     colours = lab_of(mean)
-    ways = [np.sqrt(((colours - under) ** 2).sum(2)) for under in continued(colours, ground, directions)]
+    ways = [np.sqrt(((colours - under) ** 2).sum(2)) for under in continuations(colours, ground, directions)]
     ways.append(np.minimum.reduce(ways))
     # By the places that are told best: the object tells nothing of its ground.
     most = int(_TOLD * inner.sum())
@@ -327,13 +256,14 @@ def _segmented(
         return along, None
     core = ((apart > level) & inner).astype(np.uint8)
     core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
-    places = own.shape[0] / (2 * _REACH)  # of the grid, from one object to the next
+    places = own.shape[0] / (2 * REACH)  # of the grid, from one object to the next
     whole = _hull(_loose(core, own * places)) & inner
     share = float(whole.sum() / inner.sum())
     if not _LEAST_SHARE <= share <= _MOST_SHARE:
         return along, None
-    # Where cells differ beside an object its edge slips.
-    differs = np.maximum(apart, _SLIPPED * 100 * spread)
+    # Where cells differ beside an object more than their ground does, its edge slips.
+    slips = np.sqrt(np.maximum(spread**2 - np.median(spread[ground]) ** 2, 0))
+    differs = np.maximum(apart, _SLIPPED * 100 * slips)
     seen = (differs > max(_JUST_SEEN, _SEEN_DEVIATIONS * noise)) & inner
     seen = cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_OPEN, _disc(1)) > 0
     seen &= cv2.dilate(whole.astype(np.uint8), _disc(_HANGS_ON * places)) > 0
@@ -345,7 +275,7 @@ def _segmented(
 
 def _smoothed_over(colours: Floats, ground: Mask) -> Array:
     """How far the ground's colours [side, side, 3] lie from their own smooth continuation: [side, side]."""
-    under = cv2.GaussianBlur(filled(colours, ground), (0, 0), 0.06 * colours.shape[0] / (2 * _REACH))
+    under = cv2.GaussianBlur(filled(colours, ground), (0, 0), 0.06 * colours.shape[0] / (2 * REACH))
     return np.sqrt(((colours - under) ** 2).sum(2))
 
 

@@ -16,12 +16,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from p3i.paint.fill.cutout import sampled_cells
-from p3i.place.moves import frames
+from p3i.paint.fill.sampled import sampled_cells
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
 from p3i.vision.lab import lab_of
-from p3i.vision.sheet import project
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -68,11 +66,11 @@ def differing(placed: Placed, photo: Image, *, hole: Mask | None = None) -> Diff
     With a `hole` [H, W], which is not looked at, only cells that it takes a part of are told of, and no more
     others than it takes to know what is usual.
     """
-    sampled = sampled_cells(placed, photo)
+    sampled = sampled_cells(placed, photo, hole=hole)
     # Every other place, of means over three: what is looked for is no finer.
     own, places, step = sampled.own[::2, ::2], sampled.places / 2, 2 * sampled.step
     seen = sampled.seen[:, ::2, ::2] & (own > 0)
-    known = seen if hole is None else seen & ~_in_hole(placed, hole, own, step)
+    known = seen & ~sampled.hidden[:, ::2, ::2]
     judged = np.flatnonzero(known.sum((1, 2)) > _LEAST_SEEN_OF_CELL * (own > 0).sum())
     if len(judged) < _FEWEST:
         return None
@@ -115,23 +113,6 @@ def _in_one_light(colours: Floats, known: Mask) -> Floats:
         [np.median((cell - middle)[where], axis=0) for cell, where in zip(colours, known, strict=True)]
     )
     return colours - off[:, None, None].astype(np.float32)
-
-
-def _in_hole(placed: Placed, hole: Mask, own: Array, step: float) -> Mask:
-    """Which places of each cell [N, side, side] a hole [H, W] hides, wholly or at its edge."""
-    half = (own.shape[0] - 1) / 2
-    y, x = (np.mgrid[: own.shape[0], : own.shape[0]] - half) * step
-    local = np.stack([x.ravel(), y.ravel()], 1)
-    # Cells are read with what is beside each place.
-    wide = cv2.dilate(hole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    found = np.zeros((len(placed.index), *own.shape), bool)
-    height, width = hole.shape
-    for number, frame in enumerate(frames(placed)):
-        at, front = project(placed.image_from_plane, local @ frame[:2, :2].T + frame[:2, 2])
-        inside = front & (at >= 0).all(1) & (at[:, 0] <= width - 1) & (at[:, 1] <= height - 1)
-        columns, rows = np.rint(np.where(inside[:, None], at, 0)).astype(int).T
-        found[number] = (inside & wide[rows, columns]).reshape(own.shape)
-    return found
 
 
 def _evenly(numbers: NDArray[np.int64]) -> NDArray[np.int64]:

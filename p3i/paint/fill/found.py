@@ -124,8 +124,7 @@ def find_marred(photo: Image, program: Program, *, focal_mm: float | None = None
     mars = _mars(mask, bits, _cells_of(laid, found), names)
     notes = _notes(found, mars)
     if flat.k1 is not None:
-        bent = flat.bent(np.repeat(mask[:, :, None], 3, 2).astype(np.float32))[:, :, 0]
-        mask = (bent > 0.25) & photo.valid
+        mask = flat.bent_mask(mask, least=0.25) & photo.valid
     return Marred(photo, mask, mars, notes)
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from p3i.errors import UsageError
 from p3i.grammar.ast import Program
 from p3i.options.points import PointsOptions
+from p3i.place.flat import Flat
 from p3i.place.objects import Object, objects_of
 from p3i.place.placed import Placed, placed
 from p3i.vision.image import Image, read_mask
@@ -33,6 +34,9 @@ CHANGED = (
 
 # A share of a hole below this is not told of.
 _LEAST_TOLD = 0.01
+# Straightening a bent photo mixes neighbours: a hole in it is this many pixels wider.
+_LENS_MARGIN_PX = 2
+_ALL = "the hole takes all of the photo: nothing would be left to fill it from"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,13 +97,7 @@ def asked_for(
     focal_mm: float | None = None,
 ) -> Asked:
     """What is to be filled, bool [H, W], by the arguments of `inpaint`, which says what is raised."""
-    hole = np.zeros(photo.valid.shape, bool)
-    if isinstance(mask, np.ndarray):
-        if mask.shape != hole.shape or mask.dtype != np.bool_:
-            raise UsageError(f"a mask is bool {hole.shape}, not {mask.dtype} {mask.shape}")
-        hole |= mask
-    elif mask is not None:
-        hole |= read_mask(mask, photo.size)
+    hole = _marked(photo, mask)
     listed = _listed(photo, program, focal_mm=focal_mm) if restore or remove else ()
     if restore:
         hole |= _cells([_found(listed, asked) for asked in restore], hole.shape)
@@ -111,8 +109,37 @@ def asked_for(
             "nothing is to be filled: give --mask FILE (white is filled), --restore NAME or --remove NAME"
         )
     if (hole | ~photo.valid).all():
-        raise UsageError("the hole takes all of the photo: nothing would be left to fill it from")
+        raise UsageError(_ALL)
     return Asked(hole, tuple(dict.fromkeys((one.i, one.j) for one in going)))
+
+
+def marked(photo: Image, mask: str | PathLike[str] | Mask | None) -> Mask:
+    """What `mask` marks of a photo, bool [H, W]; nothing without one. Raises as `asked_for` does."""
+    hole = _marked(photo, mask)
+    if (hole | ~photo.valid).all():
+        raise UsageError(_ALL)
+    return hole
+
+
+def on_flat(flat: Flat, hole: Mask) -> Mask:
+    """A hole [H, W] of a photo on its flat canvas [h, w].
+
+    A bent photo is filled where it is straight, and the hole's pixels are brought back: around it as much is
+    filled as bringing back mixes in, beyond the photo's edge too.
+    """
+    if flat.k1 is None:
+        return hole
+    wider = np.ones((2 * _LENS_MARGIN_PX + 1,) * 2, np.uint8)
+    return cv2.dilate(flat.marked(hole).astype(np.uint8), wider) > 0
+
+
+def _marked(photo: Image, mask: str | PathLike[str] | Mask | None) -> Mask:
+    """What a mask marks of a photo, bool [H, W], a copy; nothing without one."""
+    if isinstance(mask, np.ndarray):
+        if mask.shape != photo.valid.shape or mask.dtype != np.bool_:
+            raise UsageError(f"a mask is bool {photo.valid.shape}, not {mask.dtype} {mask.shape}")
+        return mask.copy()
+    return np.zeros(photo.valid.shape, bool) if mask is None else read_mask(mask, photo.size)
 
 
 def only(laid: Placed, index: Sequence[tuple[int, int]]) -> Placed:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,10 +19,10 @@ from p3i.paint.fill.cleared import cleared, covered
 from p3i.paint.fill.cutout import cutout, doubts
 from p3i.paint.fill.filled import Filled, share_text
 from p3i.paint.fill.found import beside_hole
-from p3i.paint.fill.holes import CHANGED, HoleFacts, Named, asked_for, facts_of, only
+from p3i.paint.fill.holes import CHANGED, HoleFacts, Named, asked_for, facts_of, on_flat, only
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.continued import continued
-from p3i.place.flat import Flat, flat_of
+from p3i.place.flat import flat_of
 from p3i.place.moves import pitch_px
 from p3i.place.placed import Placed
 from p3i.records import changed
@@ -33,10 +32,6 @@ from p3i.vision.picture import Picture, opacity, repainted
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 Progress = Callable[[str, float], None]
-
-# Straightening a bent photo mixes neighbours: a hole in it is this many pixels wider.
-_LENS_MARGIN_PX = 2
-
 
 # The surroundings of a hole that are looked at for what is not of the pattern, in distances between objects.
 _BESIDE = 0.15
@@ -125,32 +120,25 @@ def inpaint(
     wanted = asked_for(photo, program, mask=mask, restore=restore, remove=remove, focal_mm=asked.focal_mm)
     flat = flat_of(photo, program, focal_mm=asked.focal_mm)
     hole = wanted.hole
-    # A bent photo is filled where it is straight, and the hole's pixels are brought back. Around the hole as
-    # much is filled as bringing back mixes in, beyond the photo's edge too.
-    wider = np.ones((2 * _LENS_MARGIN_PX + 1,) * 2, np.uint8)
-    flat_hole = hole if flat.k1 is None else cv2.dilate(flat.marked(hole).astype(np.uint8), wider) > 0
+    flat_hole = on_flat(flat, hole)
     found = Filled(flat.photo.pixels, np.zeros_like(flat_hole), np.zeros_like(flat_hole))
     more = continued(flat.placed, flat.photo, hole=flat_hole)
     if hole.any():
         found = _filled(flat.photo, more.joined(flat.placed), flat_hole, asked, progress)
     notes, pixels, gone = list[str](), found.pixels, np.zeros_like(flat_hole)
-    if count := len(more.index):
-        notes.append(
-            f"the pattern goes on through the hole: {count} "
-            f"{'object is' if count == 1 else 'objects are'} added that the program does not draw"
-        )
+    notes += more.notes()
     if wanted.removed:
         ground, gone, said = _taken_away(flat.photo, flat.placed, flat_hole, wanted.removed)
-        pixels = np.where(gone[:, :, None], ground, pixels)
+        pixels = ground if not hole.any() else np.where(gone[:, :, None], ground, pixels)
         notes += [CHANGED, *said]
     guess, strange = beside_hole(flat.photo, flat.placed, flat_hole | gone)
     of_pattern = flat_hole & ~gone
     parts = [found.unlike & ~gone, found.fallback & ~gone, guess & of_pattern, strange, gone]
     if flat.k1 is not None:
-        pixels, parts = flat.bent(np.asarray(pixels, np.float32)), [_bent(flat, part) for part in parts]
+        pixels, parts = flat.bent(np.asarray(pixels, np.float32)), [flat.bent_mask(part) for part in parts]
     unlike, fallback, guess, strange, gone = parts
     hole = hole | (gone & photo.valid)
-    pixels = np.where(hole[:, :, None], pixels, photo.pixels).astype(np.float32)
+    pixels = np.where(hole[:, :, None], pixels, photo.pixels).astype(np.float32, copy=False)
     reach_px = max(3.0, _BESIDE * _typical_pitch_px(flat.placed))
     facts = facts_of(hole, unlike=unlike, guess=guess, strange=strange, ground=gone, reach_px=reach_px)
     told = [one.sentence() for one in facts if one.note]
@@ -174,11 +162,6 @@ def inpaint(
     )
 
 
-def _bent(flat: Flat, mask: Mask) -> Mask:
-    """A mask of the flat photo as the lens shows it."""
-    return flat.bent(np.repeat(mask[:, :, None], 3, 2).astype(np.float32))[:, :, 0] > 0.5
-
-
 def _typical_pitch_px(laid: Placed) -> float:
     """How far the next object lies from the one in the middle, in pixels."""
     return pitch_px(laid, int(np.argmin(np.hypot(*(laid.points - np.median(laid.points, 0)).T))))
@@ -193,8 +176,9 @@ def _taken_away(
     """
     known = masked(photo, hole) if hole.any() else photo
     cut = cutout(laid, known)
-    gone = covered(only(laid, removed), cut) & photo.valid
-    ground = cleared(known.pixels, known.valid, laid, cut, objects=gone)
+    ground, gone = cleared(
+        known.pixels, known.valid, laid, cut, objects=covered(only(laid, removed), cut) & photo.valid
+    )
     return ground, gone, doubts(cut)
 
 

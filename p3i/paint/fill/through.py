@@ -45,7 +45,7 @@ class _Ends:
     seen: Mask
 
 
-def continued(values: Floats, known: Mask, directions: Array) -> list[Floats]:
+def continuations(values: Floats, known: Mask, directions: Array) -> list[Floats]:
     """All that is not known, continued smoothly, then along each direction alone: pictures [h, w, C].
 
     Where a direction meets what is known on one side only, or on none, the smooth continuation stands.

@@ -14,6 +14,7 @@ from p3i.options.edit import parse_scale
 from p3i.paint.edit.edit import edit
 from p3i.paint.fill.cleared import covered
 from p3i.paint.fill.cutout import cutout
+from p3i.paint.fill.inpaint import inpaint
 from p3i.place.placed import placed
 from p3i.vision.image import Image, read_image
 from p3i.vision.sheet import project
@@ -44,7 +45,7 @@ def test_the_same_program_leaves_the_photo_as_it_is(text: str) -> None:
     found = edit(photo, loads(text), loads(text))
     assert np.array_equal(found.pixels, photo.pixels)
     assert not found.touched.any()
-    assert (found.removed, found.added) == (0, 0)
+    assert (found.removed, found.copied) == (0, 0)
 
 
 @pytest.mark.parametrize("text", [LATTICE, RING])
@@ -59,7 +60,7 @@ def test_the_object_of_a_cell_is_told_from_its_ground(text: str) -> None:
 def test_a_sparser_program_removes_every_other_column_and_keeps_the_rest() -> None:
     photo = drawn(LATTICE)
     found = edit(photo, loads(LATTICE), loads(SPARSER))
-    assert (found.kept, found.removed, found.added) == (35, 28, 0)
+    assert (found.kept, found.removed, found.copied) == (35, 28, 0)
     expected = drawn(SPARSER)
     gone = near(photo, LATTICE, 24) & ~near(photo, SPARSER, 26)
     assert wrong(photo.pixels, expected.pixels, gone) > 30
@@ -74,7 +75,7 @@ def test_added_objects_look_as_if_they_had_always_been_there(text: str) -> None:
     found = edit(photo, loads(LATTICE), loads(text))
     camera = LATTICE.split("\n", 1)[0] + "\n"
     laid = placed(loads(text if text.startswith("Set") else camera + text), photo)
-    assert found.added > 5
+    assert found.copied > 5
     for x, y in np.rint(laid.centers_px()[0]).astype(int):
         here = found.pixels[y - 3 : y + 4, x - 3 : x + 4].mean((0, 1))
         assert here[1] > 1.2 * here[2] and here.mean() < 0.45, "a mark is dark and green in its middle"
@@ -87,7 +88,7 @@ def test_marks_turn_with_their_ring() -> None:
     found = edit(photo, loads(RING), loads(new))
     expected = drawn(new)
     marks = near(photo, new, 11)
-    assert found.removed == found.added == 12
+    assert found.removed == found.copied == 12
     assert wrong(found.pixels, expected.pixels, marks) < 8
 
 
@@ -105,12 +106,61 @@ def test_what_is_not_touched_stays_to_the_bit_in_sixteen_bits_with_alpha(tmp_pat
     alpha[:30, :30] = 0
     write_image(tmp_path / "a.png", drawn(LATTICE).pixels + np.float32(100 / 65535), alpha=alpha, bits=16)
     photo = read_image(tmp_path / "a.png")
-    found = edit(photo, loads(LATTICE), loads(SPARSER))
+    found = edit(photo, loads(LATTICE), loads(SPARSER), keep_transparent=True)
     picture = found.paint()
     assert picture.bits == 16 and picture.alpha is not None
     assert np.array_equal(picture.alpha, np.rint(alpha * 65535).astype(np.uint16))
     same = ~found.touched & photo.valid
     assert np.array_equal(picture.values[same], np.rint(photo.pixels[same] * 65535).astype(np.uint16))
+
+
+def hidden_right(photo: Image, from_x: int) -> tuple[Image, np.ndarray]:
+    """The photo without what lies right of `from_x`, and a mask of that."""
+    hole = np.zeros(photo.valid.shape, bool)
+    hole[:, from_x:] = True
+    return dataclasses.replace(photo, pixels=np.where(hole[:, :, None], np.float32(0), photo.pixels)), hole
+
+
+def test_the_same_program_fills_hidden_ground_as_inpaint_does() -> None:
+    photo, hole = hidden_right(drawn(LATTICE), 390)
+    short = loads(LATTICE.replace("range(-4, 5)", "range(-4, 4)"))
+    found, filled = edit(photo, short, short, mask=hole), inpaint(photo, short, mask=hole)
+    assert np.array_equal(found.pixels, filled.pixels)
+    assert found.added == filled.added and len(found.added) > 5
+    record = found.record()
+    assert (record["filled"], record["unlike"], record["added"]) == tuple(
+        filled.record()[name] for name in ("filled", "unlike", "added")
+    )
+
+
+def test_a_sparser_program_goes_on_over_hidden_ground() -> None:
+    """The old program ends at the hole, and so does the new one; both go on, the new one every other step."""
+    photo, hole = hidden_right(drawn(LATTICE), 340)
+    short = LATTICE.replace("range(-4, 5)", "range(-4, 3)")
+    sparser = short.replace("9*i", "18*i").replace("range(-4, 3)", "range(-2, 2)")
+    found = edit(photo, loads(short), loads(sparser), mask=hole)
+    assert wrong(found.pixels, drawn(SPARSER).pixels, hole & near(photo, LATTICE, 12)) < 8
+
+
+def test_what_is_transparent_is_filled_where_it_is_pattern_unless_told_otherwise() -> None:
+    photo = drawn(LATTICE)
+    valid = np.ones_like(photo.valid)
+    valid[180:240, 200:280] = False
+    given = dataclasses.replace(photo, valid=valid)
+    found = edit(given, loads(LATTICE), loads(SPARSER))
+    assert found.paint().alpha is None and np.array_equal(found.filled, ~valid)
+    assert wrong(found.pixels, drawn(SPARSER).pixels, ~valid) < 6
+    kept = edit(given, loads(LATTICE), loads(SPARSER), keep_transparent=True)
+    alpha = kept.paint().alpha
+    assert alpha is not None and np.array_equal(alpha > 0, valid) and not kept.filled.any()
+
+
+def test_a_mask_is_refused_by_name(tmp_path: Path) -> None:
+    photo = drawn(LATTICE)
+    with pytest.raises(UsageError, match="a mask is bool"):
+        edit(photo, loads(LATTICE), loads(SPARSER), mask=np.zeros((3, 4), bool))
+    with pytest.raises(UsageError, match="takes all of the photo"):
+        edit(photo, loads(LATTICE), loads(SPARSER), mask=np.ones(photo.valid.shape, bool))
 
 
 def test_a_cell_without_an_object_is_said_to_have_none() -> None:

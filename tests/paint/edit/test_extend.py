@@ -170,11 +170,51 @@ def test_sixteen_bits_and_transparency_are_kept(tmp_path: Path) -> None:
     given = cropped(drawn(ENDLESS))
     write_image(tmp_path / "a.png", given.pixels + np.float32(100 / 65535), alpha=alpha, bits=16)
     photo = read_image(tmp_path / "a.png")
-    picture = extend(photo, on_crop(PART), by=Margins(0, 0, 20, 0), focal_mm=FOCAL).paint()
+    asked = {"by": Margins(0, 0, 20, 0), "focal_mm": FOCAL}
+    picture = extend(photo, on_crop(PART), keep_transparent=True, **asked).paint()
     assert picture.bits == 16
     assert picture.alpha is not None
     assert (picture.alpha[:, 360:] == 65535).all() and (picture.alpha[100:120, 100:120] == 0).all()
     assert np.array_equal(picture.values[:, :360], np.rint(photo.pixels * 65535).astype(np.uint16))
+
+
+def test_what_is_hidden_in_the_photo_is_filled_as_well() -> None:
+    given = cropped(drawn(ENDLESS))
+    hole = np.zeros(given.valid.shape, bool)
+    hole[100:140, 100:160] = True
+    masked = dataclasses.replace(given, pixels=np.where(hole[:, :, None], np.float32(0), given.pixels))
+    clear = dataclasses.replace(given, valid=~hole)
+    for found in (
+        extend(masked, on_crop(PART), by=Margins(0, 0, 20, 0), focal_mm=FOCAL, mask=hole),
+        extend(clear, on_crop(PART), by=Margins(0, 0, 20, 0), focal_mm=FOCAL),
+    ):
+        assert np.abs(found.pixels[:, :360] - given.pixels)[hole].mean() * 255 < 5
+        assert np.array_equal(found.pixels[:, :360][~hole], given.pixels[~hole])
+        assert found.filled == found.record()["filled"] == hole.sum() and found.paint().alpha is None
+
+
+def test_what_was_transparent_stays_so_where_the_pattern_does_not_go_on() -> None:
+    text = LATTICE.replace("range(-4, 5)", "range(-2, 3)").replace("range(-3, 4)", "range(-14, 15)")
+    photo = drawn(text)
+    valid = np.ones_like(photo.valid)
+    valid[150:200, :20] = False  # beside the pattern
+    found = extend(
+        dataclasses.replace(photo, valid=valid), loads(text), by=Margins(0, 0, 0, 10), beyond="continue"
+    )
+    assert found.alpha is not None and (found.alpha[150:200, :20] == 0).all() and found.filled == 0
+
+
+def test_a_painted_border_takes_no_part_in_what_is_added() -> None:
+    given, whole = cropped(drawn(ENDLESS)), drawn(ENDLESS)
+    framed = given.pixels.copy()
+    for side in (framed[:8], framed[-8:], framed[:, :8], framed[:, -8:]):
+        side[:] = (0.6, 0.05, 0.1)
+    photo = dataclasses.replace(given, pixels=framed)
+    found = extend(photo, on_crop(PART), by=ALL_AROUND, focal_mm=FOCAL)
+    assert any("left 8, top 8, right 8, bottom 8" in note for note in found.notes)
+    assert np.abs(found.pixels - whole.pixels)[outside(whole)].mean() * 255 < 8
+    assert np.array_equal(found.pixels[MARGIN:-MARGIN, MARGIN:-MARGIN], framed)
+    assert not any("photo's edge" in note for note in extend(given, on_crop(PART), by=ALL_AROUND).notes)
 
 
 def test_cells_are_counted_at_the_middle_of_a_side() -> None:

@@ -8,7 +8,7 @@ from p3i import loads
 from p3i.paint.fill.cutout import cutout
 from p3i.paint.fill.holes import CHANGED
 from p3i.paint.fill.inpaint import inpaint
-from p3i.paint.fill.through import continued, through
+from p3i.paint.fill.through import continuations, through
 from p3i.place.placed import placed
 from p3i.vision.image import Image
 from p3i.vision.sheet import project
@@ -48,6 +48,38 @@ def test_bars_between_objects_stay_between_them(axis: int) -> None:
     assert np.abs(found.pixels - ground)[found.hole].mean() * 255 < 3
     assert np.array_equal(found.pixels[~found.hole], photo.pixels[~found.hole])
     assert found.removed == 3
+
+
+def test_light_that_rises_over_the_photo_leaves_no_steps_between_removed_neighbours() -> None:
+    """Each cell is lighter on one side: no ground of a cell, but light."""
+    plane = plane_of(LATTICE)
+    light = np.exp(0.012 * plane[..., :1]).astype(np.float32)
+    ground = np.float32((0.6, 0.1, 0.15)) * light
+    photo = with_objects(LATTICE, ground, radius=3.6)
+    found = inpaint(photo, loads(LATTICE), remove=[(0, 0), (1, 0), (0, 1), (1, 1), (-1, 0), (-1, 1)])
+    assert np.abs(found.pixels - ground)[found.hole].max() * 255 < 6
+    assert found.hole.mean() < 0.12, "the ground between them is not taken for theirs"
+
+
+def test_what_hangs_on_an_object_beyond_the_common_outline_goes_with_it() -> None:
+    """One disc is larger than the others: its rim would stay as a ring."""
+    ground = np.full((400, 480, 3), 0.75, np.float32)
+    photo = with_objects(LATTICE, ground, radius=2.6)
+    pixels, plane = photo.pixels.copy(), plane_of(LATTICE)
+    laid = placed(loads(LATTICE), photo)
+    one = laid.points[[tuple(index) == (1, 1) for index in laid.index.tolist()]][0]
+    pixels[np.hypot(*np.moveaxis(plane - one, -1, 0)) < 3.1] = INK
+    found = inpaint(Image(pixels, photo.valid), loads(LATTICE), remove=[(1, 1)])
+    here = np.hypot(*np.moveaxis(plane - one, -1, 0)) < 4
+    assert np.abs(found.pixels - ground)[here].max() * 255 < 8
+
+
+def test_far_objects_are_taken_away_each_as_if_alone() -> None:
+    photo = with_objects(LATTICE, barred(LATTICE, 0, at=4.5), radius=2.6)
+    both = inpaint(photo, loads(LATTICE), remove=[(-4, -3), (4, 3)])
+    for one in ((-4, -3), (4, 3)):
+        alone = inpaint(photo, loads(LATTICE), remove=[one])
+        assert np.array_equal(both.pixels[alone.hole], alone.pixels[alone.hole])
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -118,5 +150,5 @@ def test_a_line_is_drawn_on_where_both_sides_show_it_and_nowhere_else() -> None:
     given = np.where(known[..., None], values, np.float32(9))
     found = through(given, known, ~known, np.array([(1.0, 0), (0, 1)]))
     assert np.abs(found - values).mean() < 0.03
-    along = continued(given, known, np.array([(1.0, 0)]))[1]
+    along = continuations(given, known, np.array([(1.0, 0)]))[1]
     assert np.abs(along - values)[:, 12:29].max() < 1e-5
