@@ -1,6 +1,5 @@
 """`paint`: the neural painting network from a photo and a hole to the filled photo."""
 
-import dataclasses
 import time
 
 import numpy as np
@@ -10,22 +9,21 @@ from p3i.errors import UsageError
 from p3i.options.npn import NetworkOptions
 from p3i.paint.fill.filled import Filled, share_text
 from p3i.paint.fill.npn import checkpoint
-from p3i.paint.fill.npn.cells import Cells, cells_of, finer, laid
-from p3i.paint.fill.npn.compose import Task, painted
+from p3i.paint.fill.npn.blend import blended
+from p3i.paint.fill.npn.cells import Cells, cells_of, finer
+from p3i.paint.fill.npn.compose import painted
 from p3i.paint.fill.npn.judge import judged
 from p3i.paint.fill.npn.lessons import lessons, teachers
 from p3i.paint.fill.npn.network import PaintingNetwork
 from p3i.paint.fill.npn.shipped import shipped
 from p3i.paint.fill.npn.stacks import pool_of
+from p3i.paint.fill.npn.tasks import Task, tasks_of
 from p3i.paint.fill.npn.training import Progress, begun, train
 from p3i.paint.fill.sources import Floats, Ground, Mask
 from p3i.paint.fill.stack import fill_by_stack
-from p3i.place.moves import nearest
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
-from p3i.vision.sheet import project
 from p3i.vision.threads import limited_threads
-from p3i.vision.warp import sample
 
 # So many lessons are cut into a photo.
 _LESSONS = 64
@@ -33,8 +31,6 @@ _LESSONS = 64
 _RATE = 5e-4
 # Fewer objects than this are no pattern to learn from.
 _FEWEST = 4
-# A part of a hole is a sliver where it has less than this share of the pixels of the largest.
-_SLIVER = 0.2
 
 
 def paint(
@@ -103,20 +99,20 @@ def _by_network(
     jury = judged(photo, placed, hole, certain, pool_of(certain, numbers), tasks, seed=options.seed)
     if jury is None:
         return too_few
-    taught, fine = certain.without(jury.hidden), finer(cells, seen, hole, bare)
+    taught = certain.without(jury.hidden)
     network = _trained(photo, placed, taught, jury.numbers, tasks, options, device, progress)
-    mix = jury.verdict(network, taught, fine.without(hole | jury.hidden))
-    if mix == 0:
+    share = jury.share(network)
+    if share == 0:
         return "the network is not surer than the stack on cells that it did not learn from"
-    ground = Ground.of(photo.pixels, photo.valid & ~hole)
+    ground, fine = Ground.of(photo.pixels, photo.valid & ~hole), finer(cells, seen, hole, bare)
     filled, by_it = stack.pixels.copy(), np.zeros_like(hole)
     pool = pool_of(cells, numbers)
-    for task, (colours, seen) in zip(tasks, painted(network, cells, fine, pool, ground, tasks), strict=True):
-        columns, rows = task.points[seen].astype(int).T
-        filled[rows, columns] += mix * (colours[seen] - filled[rows, columns])
+    for task, (colours, shown) in zip(tasks, painted(network, cells, fine, pool, ground, tasks), strict=True):
+        columns, rows = task.points[shown].astype(int).T
+        filled[rows, columns] = colours[shown]
         by_it[rows, columns] = True
     by_it &= ~bare
-    return filled[by_it], by_it
+    return blended(stack.pixels, filled, by_it, share)[by_it], by_it
 
 
 def _trained(
@@ -156,35 +152,6 @@ def _trained(
                 progress=progress,
             )
     return training.mean
-
-
-def tasks_of(cells: Cells, placed: Placed, hole: Mask) -> list[Task]:
-    """The hidden cells: the hole [H, W] split by the program's centres, as far as each patch reaches."""
-    points = np.argwhere(hole)[:, ::-1].astype(float)
-    on_plane, front = project(np.linalg.inv(placed.image_from_plane), points)
-    own = np.where(front, nearest(placed, on_plane), -1)
-    # A sliver of a cell is painted with the largest part beside it: alone it would hang on that one's fill.
-    numbers, counts = np.unique(own[own >= 0], return_counts=True)
-    large = numbers[counts >= _SLIVER * counts.max(initial=0)]
-    owners = dataclasses.replace(placed, points=placed.points[large], index=placed.index[large])
-    own = np.where(front, large[nearest(owners, on_plane)] if len(large) else -1, -1)
-    order = np.argsort(own, kind="stable")
-    found: list[Task] = []
-    marked = torch.from_numpy(hole.astype(np.float32))[None]
-    photo_from_small = torch.from_numpy(np.linalg.inv(cells.from_photo))
-    plane_from_photo = np.linalg.inv(placed.image_from_plane)
-    for part in np.split(order, np.flatnonzero(np.diff(own[order])) + 1):
-        number = int(own[part[0]]) if len(part) else -1
-        if number < 0 or not bool(torch.isfinite(cells.views[number]).all()):
-            continue
-        # A patch's pixel is hidden where the photo's pixel nearest to it is, and it is this cell's own.
-        at, seen = laid(photo_from_small @ cells.views[number].cpu(), cells.patch)
-        ground, _ = project(plane_from_photo, at.numpy().reshape(-1, 2).astype(float))
-        mine = torch.from_numpy(large[nearest(owners, ground)] == number).reshape(seen.shape)
-        outline = (sample(marked, at)[..., 0] > 0.01) & seen & mine
-        if outline.any():
-            found.append(Task(number, outline.float()[None], points[part]))
-    return found
 
 
 def device_of(name: str) -> torch.device:
