@@ -27,8 +27,8 @@ from p3i.vision.threads import limited_threads
 
 # So many lessons are cut into a photo.
 _LESSONS = 64
-# The shipped weights are moved gently: a photo has few cells to learn from.
-_RATE = 5e-4
+# The rate of learning on a photo, that which the shipped weights began with.
+_RATE = 2e-3
 # Fewer objects than this are no pattern to learn from.
 _FEWEST = 4
 
