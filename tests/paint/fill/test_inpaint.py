@@ -135,7 +135,10 @@ def test_the_pattern_goes_on_through_a_hole_at_whose_rim_the_program_ends() -> N
     assert np.abs(found.pixels - photo.pixels)[cells].mean() * 255 < 14
 
 
-def test_npn_says_so_where_it_gives_the_stacks_fill_to_a_hole_of_many_cells() -> None:
+def test_npn_says_so_where_it_gives_the_stacks_fill_to_a_hole_of_many_cells(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("p3i.paint.fill.npn.judge.share_of", lambda *given: 0.0)
     photo = drawn(LATTICE, width=240, height=200)
     hole = np.zeros(photo.valid.shape, bool)
     hole[10:190, 10:165] = True

@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 
 MOST, FEWEST = 8, 3
 """So many copies are made at most; fewer than so many whole ones, and copies are of single cells' parts."""
-# They hide this share of the pattern's known ground at most, ...
+# They hide as much as this share of the cells that they may lie upon, ...
 _MOST_HIDDEN = 0.25
 # ... lie this far apart, in distances between objects, ...
 _APART = 0.4
@@ -36,14 +36,21 @@ _TRIES = 8
 
 
 def copies(
-    known: Mask, hole: Mask, placed: Placed, tasks: list[Task], places: list[int], *, seed: int
+    known: Mask,
+    hole: Mask,
+    placed: Placed,
+    tasks: list[Task],
+    places: list[int],
+    *,
+    cell_px: float,
+    seed: int,
 ) -> list[NDArray[np.int64]]:
     """The pixels [L, 2] of each copy of the `hole`; `places` are the objects upon which copies may lie.
 
-    `known` is what is known beside the hole, `tasks` are the hole's parts.
+    `known` is what is known beside the hole, `tasks` are the hole's parts; a cell has about `cell_px` pixels.
     """
     drawn = drawn_on(placed) > 0
-    room = _MOST_HIDDEN * int((known & drawn).sum())
+    room = _MOST_HIDDEN * len(places) * cell_px
     wholes = _components(hole, placed)
     found: list[NDArray[np.int64]] = []
     if min(len(points) for _, points in wholes) * FEWEST <= room:

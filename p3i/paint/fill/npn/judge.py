@@ -22,8 +22,6 @@ from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
 
-Array = NDArray[np.float64]
-
 PRIOR, PRIOR_SPREAD = 0.5, 0.25
 """The share that is best, in the mean of photos, and its standard deviation from one to another: of nine
 photos (docs/npn.md), 0.52 and 0.24 by the method of moments."""
@@ -33,8 +31,8 @@ photos (docs/npn.md), 0.52 and 0.24 by the method of moments."""
 class Jury:
     """Copies of the hole to judge by, the pixels [L, 2] of each, `hidden` [H, W] together.
 
-    `by_stack` [H, W, 3] is the photo with these filled by the stack; `cells` and `fine` are the photo's with
-    the copies and the hole hidden, `tasks` are what is to be painted of them.
+    `truth` [H, W, 3] is the photo, `by_stack` the same with the copies filled by the stack. `ground`, `cells`
+    and `fine` are the photo's with the copies and the hole hidden; `tasks` are what is to be painted.
     """
 
     ground: Ground
@@ -75,7 +73,9 @@ def judged(
     """
     known = photo.valid & ~hole
     places = pool.numbers[teachers(cells, pool)].tolist()
-    found = copies(known, hole, placed, tasks, places, seed=seed)
+    # The photo's pixels of the cell that is as large as is usual.
+    cell_px = float(cells.cell.sum() / np.linalg.det(cells.from_photo))
+    found = copies(known, hole, placed, tasks, places, cell_px=cell_px, seed=seed)
     if len(found) < FEWEST:
         return None
     hidden = np.zeros_like(hole)

@@ -44,8 +44,9 @@ def paint(
     """The photo [H, W, 3] float32 with the hole (bool [H, W]) filled; pixels outside stay bit-identical.
 
     One network is trained on the photo, from the weights that p3i ships with, and paints every hidden cell.
-    Cells that it never learned from are filled by it and by the stack too: where that does not say for sure
-    that it is better, the stack's fill stands, and `notes` and `fallback` tell. Pixels of the hole are never
+    Copies of the hole on cells that it never learned from are filled by it and by the stack too, and tell how
+    much of its fill is taken, the rest being the stack's; where that is nothing, or no copies can be made,
+    the stack's fill stands, and `notes` and `fallback` tell. Pixels of the hole are never
     read. `progress` is told the step, of how many, and the latest mean L1 (0 to 255). Raises ValueError for a
     hole of another size, UsageError for a device that is not there, FileError for a checkpoint of another
     photo.
@@ -57,13 +58,16 @@ def paint(
         result, bare = fill_by_stack(photo.pixels, photo.valid, hole, placed)
         stack = Image(result.copy(), photo.valid & ~hole)
         outcome = _by_network(photo, stack, bare, placed, hole, options, device, progress)
+    notes: list[str] = []
     if isinstance(outcome, str):
         left, why = hole & ~bare, outcome
     else:
-        fill, by_it = outcome
+        fill, by_it, share = outcome
         result[by_it] = fill
         left, why = hole & ~bare & ~by_it, "no other cell shows the like of it"
-    notes: list[str] = []
+        notes.append(
+            f"{share:.0%} of the say is the network's, the rest the stack's, as copies of the hole tell"
+        )
     if of_hole := share_text(bare, hole):
         notes.append(f"for {of_hole} the program has nothing like it: the surroundings are continued")
     if of_hole := share_text(left, hole):
@@ -80,8 +84,9 @@ def _by_network(
     options: NetworkOptions,
     device: torch.device,
     progress: Progress | None,
-) -> "tuple[Floats, Mask] | str":
-    """What is painted over the stack's fill: colours [L, 3] and where [H, W]; or why nothing is.
+) -> "tuple[Floats, Mask, float] | str":
+    """What is painted over the stack's fill: colours [L, 3], where [H, W], the network's share (0..1) of
+    them; or why nothing is.
 
     `stack` is the photo with that fill, where it is not valid.
     """
@@ -112,7 +117,7 @@ def _by_network(
         filled[rows, columns] = colours[shown]
         by_it[rows, columns] = True
     by_it &= ~bare
-    return blended(stack.pixels, filled, by_it, share)[by_it], by_it
+    return blended(stack.pixels, filled, by_it, share)[by_it], by_it, share
 
 
 def _trained(

@@ -30,7 +30,8 @@ def copied(photo: Scene, hole: np.ndarray) -> list[np.ndarray]:
     """Copies of a hole on all objects of the scene."""
     known = photo.photo.valid & ~hole
     tasks = tasks_of(cells(photo, hidden=False), photo.placed, hole)
-    return copies(known, hole, photo.placed, tasks, list(range(len(photo.placed.points))), seed=0)
+    places = list(range(len(photo.placed.points)))
+    return copies(known, hole, photo.placed, tasks, places, cell_px=400, seed=0)
 
 
 def test_copies_lie_on_known_ground_apart_from_each_other(photo: Scene) -> None:
@@ -165,7 +166,9 @@ def test_the_share_that_the_copies_give_is_what_is_painted(
     found = []
     for share in (0.0, 0.25, 1.0):
         monkeypatch.setattr("p3i.paint.fill.npn.judge.share_of", lambda *given, share=share: share)
-        found.append(paint(photo.photo, photo.placed, photo.hole, NetworkOptions(steps=0)).pixels)
+        one = paint(photo.photo, photo.placed, photo.hole, NetworkOptions(steps=0))
+        assert any(f"{share:.0%} of the say is the network's" in note for note in one.notes) == (share > 0)
+        found.append(one.pixels)
     stack, part, network = found
     assert np.abs(network - stack).max() > 0.005
     np.testing.assert_allclose(part, stack + 0.25 * (network - stack), atol=1e-5)
