@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 import torch
@@ -41,6 +42,11 @@ def test_copies_lie_on_known_ground_apart_from_each_other(photo: Scene) -> None:
     for copy in found:
         np.add.at(counted, (copy[:, 1], copy[:, 0]), 1)
     assert counted.max() == 1
+    for copy in found:
+        beside = np.zeros(photo.hole.shape, np.uint8)
+        beside[copy[:, 1], copy[:, 0]] = 1
+        beside = cv2.dilate(beside, np.ones((13, 13), np.uint8))
+        assert all(beside[other[:, 1], other[:, 0]].mean() < 0.05 for other in found if other is not copy)
     assert not counted[photo.hole].any()
     assert counted.sum() < 0.3 * photo.hole.size
 
@@ -75,7 +81,7 @@ def test_what_hangs_over_the_patterns_edge_is_copied_to_the_edge(photo: Scene) -
     share = drawn[hole].mean()
     assert 0.1 < share < 0.9
     for copy in copied(photo, hole):
-        assert abs(drawn[copy[:, 1], copy[:, 0]].mean() - share) < 0.25
+        assert abs(drawn[copy[:, 1], copy[:, 0]].mean() - share) < 0.15
 
 
 def test_judges_fill_their_copies_without_seeing_them(photo: Scene) -> None:
@@ -112,7 +118,7 @@ def test_copies_that_agree_are_believed(share: float, count: int) -> None:
 
 
 def test_copies_that_contradict_each_other_leave_the_prior() -> None:
-    assert abs(share_of(*of_copies([-3.0, 4.0, -2.0, 3.0])) - PRIOR) < 0.1
+    assert abs(share_of(*of_copies([-3.0, 4.0, 3.5, -1.0])) - PRIOR) < 0.1
 
 
 @given(shares=st.lists(st.floats(-4, 4), min_size=3, max_size=8))
