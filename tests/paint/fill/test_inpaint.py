@@ -143,7 +143,7 @@ def test_npn_says_so_where_it_gives_the_stacks_fill_to_a_hole_of_many_cells() ->
     plain = inpaint(photo, loads(LATTICE), mask=hole)
     assert np.array_equal(found.pixels, plain.pixels)
     assert found.fallback == 1 > found.unlike
-    assert any("not surer" in note and "the stack's fill stands" in note for note in found.notes)
+    assert any("too few other cells" in note and "the stack's fill stands" in note for note in found.notes)
 
 
 def test_light_is_matched_at_the_hole() -> None:

@@ -4,8 +4,6 @@ Which source to believe, and what to add, is smooth enough to be magnified; the 
 anew at the photo's full size, so that the fill is as sharp as they are.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 from p3i.paint.fill.npn.cells import Cells
 from p3i.paint.fill.npn.network import PaintingNetwork
 from p3i.paint.fill.npn.stacks import Pool, finer, stacks_of
+from p3i.paint.fill.npn.tasks import Task
 from p3i.paint.fill.sources import Ground
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
@@ -26,16 +25,6 @@ _AT_ONCE = 8
 # A source that counts for less than this everywhere is not read; a pixel is painted where its sources have
 # more than this share of the say.
 _LEAST_SAY, _LEAST_SEEN = 1e-3, 0.3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Task:
-    """A hidden cell: its object's number, its outline [1, h, w] in its patch, its pixels [L, 2] of the
-    photo."""
-
-    number: int
-    outline: torch.Tensor
-    points: Array
 
 
 def painted(

@@ -1,134 +1,107 @@
-"""Is the network surer than the stack? Both fill cells that neither the training nor they themselves see.
+"""How much of the network's fill to take? Both fill copies of the hole that neither has learned from.
 
-A few cells of the photo are set aside, far enough from one another, each with the outline that is hidden in
-one of the cells to be painted. The stack fills them as it fills a photo; the network paints them; and what is
-there in truth tells which mix of the two is nearest.
+The rest is the stack's fill. The share that comes nearest to what the copies hide is an estimate like any
+other: it has an error, told by how the copies differ, and is drawn towards what other photos say of it.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from p3i.paint.fill.npn.cells import Cells, laid
-from p3i.paint.fill.npn.compose import Task, painted
+from p3i.paint.fill.npn.cells import Cells, cells_of, finer
+from p3i.paint.fill.npn.compose import painted
+from p3i.paint.fill.npn.copies import FEWEST, copies
 from p3i.paint.fill.npn.lessons import teachers
 from p3i.paint.fill.npn.network import PaintingNetwork
 from p3i.paint.fill.npn.stacks import Pool, pool_of
+from p3i.paint.fill.npn.tasks import Task, tasks_of
 from p3i.paint.fill.sources import Floats, Ground, Mask
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
-from p3i.vision.sheet import project
-from p3i.vision.warp import taken
 
-MIXES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""How much of the network's fill may be taken, the rest being the stack's."""
-# So many cells are set aside, one in four of those that can teach at most, and with fewer nothing is sure.
-_MOST, _ONE_IN, _FEWEST = 8, 4, 3
-# Two of them lie at least this far apart, in least distances between objects.
-_APART = 1.9
-_LEAST_PX = 12
+PRIOR, PRIOR_SPREAD = 0.5, 0.25
+"""The share that is best, in the mean of photos, and its standard deviation from one to another: of nine
+photos (docs/npn.md), 0.52 and 0.24 by the method of moments."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jury:
-    """Cells set aside to judge by: their objects' `numbers` [J], the photo's pixels `hidden` [H, W] in
-    them."""
+    """Copies of the hole to judge by, the pixels [L, 2] of each, `hidden` [H, W] together.
 
-    photo: Image
-    known: Mask
+    `truth` [H, W, 3] is the photo, `by_stack` the same with the copies filled by the stack. `ground`, `cells`
+    and `fine` are the photo's with the copies and the hole hidden; `tasks` are what is to be painted.
+    """
+
+    ground: Ground
+    truth: Floats
     hidden: Mask
-    tasks: list[Task]
+    copies: list[NDArray[np.int64]]
     by_stack: Floats
+    cells: Cells
+    fine: Cells
+    tasks: list[Task]
 
     @property
     def numbers(self) -> torch.Tensor:
-        """The objects whose cells are set aside [J]."""
-        return torch.tensor([task.number for task in self.tasks])
+        """The objects in whose cells the copies lie [T]."""
+        return torch.tensor([task.number for task in self.tasks], device=self.cells.device)
 
-    def errors(self, network: PaintingNetwork, cells: Cells, fine: Cells) -> Floats:
-        """The mean L1 (0..1) of each mix over each cell set aside [J, mixes]; `cells` and `fine` must
-        hide them."""
-        numbers = self.numbers.to(cells.device)
-        ground = Ground.of(self.photo.pixels, self.known & ~self.hidden)
-        found = []
-        for task, (colours, seen) in zip(
-            self.tasks,
-            painted(network, cells, fine, pool_of(cells, numbers), ground, self.tasks),
-            strict=True,
-        ):
-            columns, rows = task.points.astype(int).T
-            start, truth = self.by_stack[rows, columns], self.photo.pixels[rows, columns]
-            change = np.where(seen[:, None], colours - start, 0)
-            found.append([float(np.abs(start + mix * change - truth).mean()) for mix in MIXES])
-        return np.array(found, np.float32)
-
-    def verdict(self, network: PaintingNetwork, cells: Cells, fine: Cells) -> float:
-        """The mix that is nearest to the truth; 0 where it is not nearer by more than chance explains."""
-        errors = self.errors(network, cells, fine)
-        place = int(errors.mean(0).argmin())
-        # Cells differ in how hard they are: what is won in each, beside how much that varies.
-        won = errors[:, 0] - errors[:, place]
-        sure = won.mean() > won.std(ddof=1) / np.sqrt(len(won))
-        return MIXES[place] if sure else 0.0
+    def share(self, network: PaintingNetwork) -> float:
+        """How much of this network's fill to take, 0..1; 0 where on the copies that comes no nearer."""
+        filled = self.by_stack.copy()
+        pool = pool_of(self.cells, self.numbers)
+        found = painted(network, self.cells, self.fine, pool, self.ground, self.tasks)
+        for task, (colours, seen) in zip(self.tasks, found, strict=True):
+            columns, rows = task.points[seen].astype(int).T
+            filled[rows, columns] = colours[seen]
+        changes, lacks = (
+            [pixels[copy[:, 1], copy[:, 0]] - self.by_stack[copy[:, 1], copy[:, 0]] for copy in self.copies]
+            for pixels in (filled, self.truth)
+        )
+        return share_of(changes, lacks)
 
 
 def judged(
     photo: Image, placed: Placed, hole: Mask, cells: Cells, pool: Pool, tasks: list[Task], *, seed: int
 ) -> Jury | None:
-    """Cells set aside, filled by the stack; None where the photo has too few.
+    """Copies of the hole [H, W], filled by the stack; None where the photo has room for too few.
 
-    `cells` must hide the `hole` [H, W].
+    `cells` must hide the hole, whose parts are the `tasks`.
     """
-    places = teachers(cells, pool).cpu()
-    chance = torch.Generator().manual_seed(seed + 1)
     known = photo.valid & ~hole
-    hidden = np.zeros_like(hole)
-    chosen: list[Task] = []
-    sizes = torch.tensor([float(len(task.points)) for task in tasks])
-    apart = _APART * _least_distance(placed)
-    for place in places[torch.randperm(len(places), generator=chance)].tolist():
-        if len(chosen) >= min(_MOST, len(places) // _ONE_IN):
-            break
-        number = int(pool.numbers[place])
-        away = placed.points[[task.number for task in chosen]] - placed.points[number]
-        if len(chosen) and np.hypot(*away.T).min() < apart:
-            continue
-        # The larger its part of the hole, the more an outline counts.
-        outline = tasks[int(torch.multinomial(sizes, 1, generator=chance))].outline
-        points = _points_of(cells, number, outline, known)
-        if len(points) < _LEAST_PX:
-            continue
-        columns, rows = points.astype(int).T
-        hidden[rows, columns] = True
-        chosen.append(Task(number, outline, points))
-    if len(chosen) < _FEWEST:
+    places = pool.numbers[teachers(cells, pool)].tolist()
+    # The photo's pixels of the cell that is as large as is usual.
+    cell_px = float(cells.cell.sum() / np.linalg.det(cells.from_photo))
+    found = copies(known, hole, placed, tasks, places, cell_px=cell_px, seed=seed)
+    if len(found) < FEWEST:
         return None
-    by_stack, _ = fill_by_stack(photo.pixels, known, hidden, placed)
-    return Jury(photo, known, hidden, chosen, by_stack)
+    hidden = np.zeros_like(hole)
+    for copy in found:
+        hidden[copy[:, 1], copy[:, 0]] = True
+    by_stack, bare = fill_by_stack(photo.pixels, known, hidden, placed)
+    seen, unknown = Image(by_stack, photo.valid), hole | hidden
+    own = cells_of(seen, placed, unknown, hole | bare, device=cells.device)
+    fine = finer(own, seen, unknown, hole | bare)
+    ground = Ground.of(photo.pixels, known & ~hidden)
+    return Jury(ground, photo.pixels, hidden, found, by_stack, own, fine, tasks_of(own, placed, hidden))
 
 
-def _points_of(cells: Cells, number: int, outline: torch.Tensor, known: Mask) -> np.ndarray:
-    """The photo's known pixels [L, 2] under an outline [1, h, w] in the patch of a cell."""
-    photo_from_patch = np.linalg.inv(cells.from_photo) @ cells.views[number].cpu().numpy()
-    at, front = laid(torch.from_numpy(photo_from_patch), cells.patch)
-    corners = at[front].reshape(-1, 2).numpy()
-    height, width = known.shape
-    low = np.clip(np.floor(corners.min(0)), 0, [width, height]).astype(int)
-    high = np.clip(np.ceil(corners.max(0)) + 1, 0, [width, height]).astype(int)
-    points = np.stack(np.meshgrid(*(np.arange(*ends) for ends in zip(low, high, strict=True))), -1).reshape(
-        -1, 2
-    )
-    within, seen = project(np.linalg.inv(photo_from_patch), points.astype(float))
-    inside = seen & (within >= 0).all(1) & (within <= [cells.patch.width - 1, cells.patch.height - 1]).all(1)
-    points = points[inside & known[points[:, 1], points[:, 0]]]
-    within, _ = project(np.linalg.inv(photo_from_patch), points.astype(float))
-    return points[taken(outline[0].cpu().numpy(), within) > 0.5].astype(float)
+def share_of(changes: list[Floats], lacks: list[Floats]) -> float:
+    """The share of the `changes` that comes nearest to what `lacks`, [L, 3] for each of some copies: 0..1.
 
-
-def _least_distance(placed: Placed) -> float:
-    """How far the nearest other object lies from that which is usual, in program units."""
-    asked = placed.points[np.linspace(0, len(placed.points) - 1, min(64, len(placed.points))).astype(int)]
-    far = np.hypot(*(asked[:, None] - placed.points).transpose(2, 0, 1))
-    return float(np.median(np.where(far > 1e-9, far, np.inf).min(1)))
+    By least squares, drawn to the prior as far as copies differ in what they say.
+    """
+    pairs = list(zip(changes, lacks, strict=True))
+    together = np.array([float((change * lack).mean()) for change, lack in pairs])
+    square = np.array([float((change**2).mean()) for change, _ in pairs])
+    if square.sum() <= 0:
+        return 0.0
+    share = together.sum() / square.sum()
+    # Copies are independent of one another, pixels of one are not.
+    count = len(pairs)
+    variance = count / (count - 1) * ((together - share * square) ** 2).sum() / square.sum() ** 2
+    weight = PRIOR_SPREAD**2 / (PRIOR_SPREAD**2 + variance)
+    return float(np.clip(weight * share + (1 - weight) * PRIOR, 0, 1))

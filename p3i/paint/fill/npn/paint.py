@@ -1,6 +1,5 @@
 """`paint`: the neural painting network from a photo and a hole to the filled photo."""
 
-import dataclasses
 import time
 
 import numpy as np
@@ -10,31 +9,28 @@ from p3i.errors import UsageError
 from p3i.options.npn import NetworkOptions
 from p3i.paint.fill.filled import Filled, share_text
 from p3i.paint.fill.npn import checkpoint
-from p3i.paint.fill.npn.cells import Cells, cells_of, finer, laid
-from p3i.paint.fill.npn.compose import Task, painted
+from p3i.paint.fill.npn.blend import blended
+from p3i.paint.fill.npn.cells import Cells, cells_of, finer
+from p3i.paint.fill.npn.compose import painted
 from p3i.paint.fill.npn.judge import judged
 from p3i.paint.fill.npn.lessons import lessons, teachers
 from p3i.paint.fill.npn.network import PaintingNetwork
 from p3i.paint.fill.npn.shipped import shipped
 from p3i.paint.fill.npn.stacks import pool_of
+from p3i.paint.fill.npn.tasks import Task, tasks_of
 from p3i.paint.fill.npn.training import Progress, begun, train
 from p3i.paint.fill.sources import Floats, Ground, Mask
 from p3i.paint.fill.stack import fill_by_stack
-from p3i.place.moves import nearest
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
-from p3i.vision.sheet import project
 from p3i.vision.threads import limited_threads
-from p3i.vision.warp import sample
 
 # So many lessons are cut into a photo.
 _LESSONS = 64
-# The shipped weights are moved gently: a photo has few cells to learn from.
-_RATE = 5e-4
+# The rate of learning on a photo, that which the shipped weights began with.
+_RATE = 2e-3
 # Fewer objects than this are no pattern to learn from.
 _FEWEST = 4
-# A part of a hole is a sliver where it has less than this share of the pixels of the largest.
-_SLIVER = 0.2
 
 
 def paint(
@@ -48,8 +44,9 @@ def paint(
     """The photo [H, W, 3] float32 with the hole (bool [H, W]) filled; pixels outside stay bit-identical.
 
     One network is trained on the photo, from the weights that p3i ships with, and paints every hidden cell.
-    Cells that it never learned from are filled by it and by the stack too: where that does not say for sure
-    that it is better, the stack's fill stands, and `notes` and `fallback` tell. Pixels of the hole are never
+    Copies of the hole on cells that it never learned from are filled by it and by the stack too, and tell how
+    much of its fill is taken, the rest being the stack's; where that is nothing, or no copies can be made,
+    the stack's fill stands, and `notes` and `fallback` tell. Pixels of the hole are never
     read. `progress` is told the step, of how many, and the latest mean L1 (0 to 255). Raises ValueError for a
     hole of another size, UsageError for a device that is not there, FileError for a checkpoint of another
     photo.
@@ -61,13 +58,16 @@ def paint(
         result, bare = fill_by_stack(photo.pixels, photo.valid, hole, placed)
         stack = Image(result.copy(), photo.valid & ~hole)
         outcome = _by_network(photo, stack, bare, placed, hole, options, device, progress)
+    notes: list[str] = []
     if isinstance(outcome, str):
         left, why = hole & ~bare, outcome
     else:
-        fill, by_it = outcome
+        fill, by_it, share = outcome
         result[by_it] = fill
         left, why = hole & ~bare & ~by_it, "no other cell shows the like of it"
-    notes: list[str] = []
+        notes.append(
+            f"{share:.0%} of the say is the network's, the rest the stack's, as copies of the hole tell"
+        )
     if of_hole := share_text(bare, hole):
         notes.append(f"for {of_hole} the program has nothing like it: the surroundings are continued")
     if of_hole := share_text(left, hole):
@@ -84,8 +84,9 @@ def _by_network(
     options: NetworkOptions,
     device: torch.device,
     progress: Progress | None,
-) -> "tuple[Floats, Mask] | str":
-    """What is painted over the stack's fill: colours [L, 3] and where [H, W]; or why nothing is.
+) -> "tuple[Floats, Mask, float] | str":
+    """What is painted over the stack's fill: colours [L, 3], where [H, W], the network's share (0..1) of
+    them; or why nothing is.
 
     `stack` is the photo with that fill, where it is not valid.
     """
@@ -103,20 +104,20 @@ def _by_network(
     jury = judged(photo, placed, hole, certain, pool_of(certain, numbers), tasks, seed=options.seed)
     if jury is None:
         return too_few
-    taught, fine = certain.without(jury.hidden), finer(cells, seen, hole, bare)
+    taught = certain.without(jury.hidden)
     network = _trained(photo, placed, taught, jury.numbers, tasks, options, device, progress)
-    mix = jury.verdict(network, taught, fine.without(hole | jury.hidden))
-    if mix == 0:
+    share = jury.share(network)
+    if share == 0:
         return "the network is not surer than the stack on cells that it did not learn from"
-    ground = Ground.of(photo.pixels, photo.valid & ~hole)
+    ground, fine = Ground.of(photo.pixels, photo.valid & ~hole), finer(cells, seen, hole, bare)
     filled, by_it = stack.pixels.copy(), np.zeros_like(hole)
     pool = pool_of(cells, numbers)
-    for task, (colours, seen) in zip(tasks, painted(network, cells, fine, pool, ground, tasks), strict=True):
-        columns, rows = task.points[seen].astype(int).T
-        filled[rows, columns] += mix * (colours[seen] - filled[rows, columns])
+    for task, (colours, shown) in zip(tasks, painted(network, cells, fine, pool, ground, tasks), strict=True):
+        columns, rows = task.points[shown].astype(int).T
+        filled[rows, columns] = colours[shown]
         by_it[rows, columns] = True
     by_it &= ~bare
-    return filled[by_it], by_it
+    return blended(stack.pixels, filled, by_it, share)[by_it], by_it, share
 
 
 def _trained(
@@ -156,35 +157,6 @@ def _trained(
                 progress=progress,
             )
     return training.mean
-
-
-def tasks_of(cells: Cells, placed: Placed, hole: Mask) -> list[Task]:
-    """The hidden cells: the hole [H, W] split by the program's centres, as far as each patch reaches."""
-    points = np.argwhere(hole)[:, ::-1].astype(float)
-    on_plane, front = project(np.linalg.inv(placed.image_from_plane), points)
-    own = np.where(front, nearest(placed, on_plane), -1)
-    # A sliver of a cell is painted with the largest part beside it: alone it would hang on that one's fill.
-    numbers, counts = np.unique(own[own >= 0], return_counts=True)
-    large = numbers[counts >= _SLIVER * counts.max(initial=0)]
-    owners = dataclasses.replace(placed, points=placed.points[large], index=placed.index[large])
-    own = np.where(front, large[nearest(owners, on_plane)] if len(large) else -1, -1)
-    order = np.argsort(own, kind="stable")
-    found: list[Task] = []
-    marked = torch.from_numpy(hole.astype(np.float32))[None]
-    photo_from_small = torch.from_numpy(np.linalg.inv(cells.from_photo))
-    plane_from_photo = np.linalg.inv(placed.image_from_plane)
-    for part in np.split(order, np.flatnonzero(np.diff(own[order])) + 1):
-        number = int(own[part[0]]) if len(part) else -1
-        if number < 0 or not bool(torch.isfinite(cells.views[number]).all()):
-            continue
-        # A patch's pixel is hidden where the photo's pixel nearest to it is, and it is this cell's own.
-        at, seen = laid(photo_from_small @ cells.views[number].cpu(), cells.patch)
-        ground, _ = project(plane_from_photo, at.numpy().reshape(-1, 2).astype(float))
-        mine = torch.from_numpy(large[nearest(owners, ground)] == number).reshape(seen.shape)
-        outline = (sample(marked, at)[..., 0] > 0.01) & seen & mine
-        if outline.any():
-            found.append(Task(number, outline.float()[None], points[part]))
-    return found
 
 
 def device_of(name: str) -> torch.device:

@@ -27,8 +27,8 @@ def photo() -> Scene:
 
 @pytest.fixture
 def trusting(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the cells set aside say, the network's fill is taken."""
-    monkeypatch.setattr(judge.Jury, "verdict", lambda *given: 1.0)
+    """Whatever the copies of the hole say, the network's fill is taken."""
+    monkeypatch.setattr(judge.Jury, "share", lambda *given: 1.0)
 
 
 def stack_of(photo: Scene, hole: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_training_on_a_photo_brings_the_shipped_weights_closer_to_its_lessons(ph
 def test_where_too_few_cells_can_be_set_aside_the_stacks_fill_stands(
     photo: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(judge, "_FEWEST", 99)
+    monkeypatch.setattr(judge, "FEWEST", 99)
     found = paint(photo.photo, photo.placed, photo.hole, SHORT)
     assert np.array_equal(found.pixels, stack_of(photo, photo.hole))
     assert found.fallback[photo.hole].all()
@@ -140,7 +140,7 @@ def test_sharpness_is_the_mean_difference_of_neighbours_within() -> None:
 def test_where_it_is_not_surer_the_stacks_fill_stands_and_is_said_to(
     photo: Scene, monkeypatch: pytest.MonkeyPatch, box: tuple[int, int, int, int]
 ) -> None:
-    monkeypatch.setattr(judge, "MIXES", (0.0,))
+    monkeypatch.setattr(judge, "share_of", lambda *given: 0.0)
     hole = np.zeros_like(photo.hole)
     hole[box[0] : box[1], box[2] : box[3]] = True
     found = paint(photo.photo, photo.placed, hole, SHORT)
@@ -162,18 +162,6 @@ def test_a_hole_of_many_cells_is_painted_by_the_one_network(photo: Scene) -> Non
     changed = np.abs(found.pixels - stack_of(photo, hole)).max(2) > 1e-5
     assert changed[hole].mean() > 0.8
     assert found.fallback[hole].mean() < 0.1
-
-
-def test_the_verdict_asks_for_more_than_chance(photo: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    def verdict(won: list[float]) -> float:
-        errors = np.array([[0.1, 0.1, 0.1, 0.1, 0.1 - one] for one in won])
-        monkeypatch.setattr(judge.Jury, "errors", lambda *given: errors)
-        jury = judge.Jury(photo.photo, photo.hole, photo.hole, [], photo.photo.pixels)
-        return jury.verdict(None, None, None)  # type: ignore[arg-type]
-
-    assert verdict([0.01, 0.012, 0.008, 0.01]) == 1
-    assert verdict([0.03, -0.02, 0.01, -0.015]) == 0
-    assert verdict([-0.01, -0.012, -0.008, -0.01]) == 0
 
 
 def test_time_stops_the_training(photo: Scene) -> None:
