@@ -227,10 +227,10 @@ def extend(
 ) -> "Extended":
     """`photo` continued beyond its frame by `program`, or by the one that `synth` finds.
 
-    What `mask` marks, as `inpaint` takes it, and what is transparent, is filled as well. `changes` are fields
-    of ExtendOptions, such as `by=parse_margins("10%,0,10%,0")`. The result has `pixels`, `margins`,
-    `paint()`, `save(path)`, `program`, `record()` and `notes`. Raises FileError, ParseError, UsageError where
-    the picture would reach the horizon, ProgramError and NoPatternError.
+    What `mask` marks (as of `inpaint`: a picture or bool [H, W]), and what is transparent, is filled.
+    `changes` are fields of ExtendOptions, such as `by=parse_margins("10%,0,10%,0")`. The result has `pixels`,
+    `margins`, `paint()`, `save(path)`, `program`, `record()` and `notes`. Raises FileError, ParseError,
+    UsageError where the picture would reach the horizon, ProgramError and NoPatternError.
     """
     asked = changed(options or ExtendOptions(), changes, verb="extend")
     from p3i.paint.edit.extend import extend as continue_photo
@@ -252,9 +252,9 @@ def edit(
 ) -> "Edited":
     """`photo` with the objects of the program `old` laid anew as the program `new` says.
 
-    Where `old` is None, it is the program that `synth` finds. What `mask` marks, as `inpaint` takes it, and
-    what is transparent, is filled first, and both programs go on over it. `changes` are fields of
-    EditOptions. The result has `pixels`, `touched`, `kept`, `removed`, `copied`, `filled`, `added`,
+    Where `old` is None, it is the program that `synth` finds. What `mask` marks (as of `inpaint`: a picture or
+    bool [H, W]), and what is transparent, is filled first, and both programs go on over it. `changes` are
+    fields of EditOptions. The result has `pixels`, `touched`, `kept`, `removed`, `copied`, `filled`, `added`,
     `paint()`, `save(path)` and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program
     without objects, and NoPatternError.
     """

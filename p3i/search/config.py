@@ -209,7 +209,7 @@ class SearchConfig:
         if asked:
             raise UsageError(f"--{asked[0]} says itself where the objects are: leave out --object")
         if self.structure == "hybrid" or (self.structure == "circular" and self.object in OBJECTS):
-            raise UsageError(f"--object {self.object} is none of {self.structure} patterns: leave it out")
+            raise UsageError(f"--object {self.object} is no place there: leave it out for {self.structure}")
 
 
 def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -34,7 +34,7 @@ from p3i.vision.image import Image
 SEEDS = (3, 7, 10, 14, 15, 18)
 QUICK = 14
 """The scene on which options are tried."""
-MANY_TRIES = 8
+MANY_TRIES = 13
 """A scene of which more than one proposal is refined."""
 
 

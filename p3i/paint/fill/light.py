@@ -15,8 +15,8 @@ Floats = NDArray[np.float32]
 _GAINS = (0.5, 2.0)
 _PRIOR = 0.1
 _PRIOR_VARIANCE = 1e-3
-# The most that is carried in from a rim.
-_MOST_CARRIED = 0.15
+MOST_CARRIED = 0.15
+"""What a rim lacks is carried in up to this."""
 # What is carried in from a rim is smoothed along it over this share of the distance to the next object, times
 # each of these: near the rim its own difference counts, further in that of more.
 _SMOOTH = 0.125
@@ -54,16 +54,6 @@ def rim_of(hole: NDArray, known: NDArray, *, reach_px: float) -> NDArray[np.bool
     """The known pixels [h, w] beside a hole [h, w], up to `reach_px` away from it."""
     far = np.asarray(cv2.distanceTransform((hole == 0).astype(np.uint8), cv2.DIST_L2, 5))
     return (far > 0) & (far <= reach_px) & known
-
-
-def membrane(off: NDArray, rim: NDArray[np.bool_], *, spacing_px: float) -> Floats:
-    """What a hole's rim [h, w] lacks, `off` [h, w, 3] there, carried smoothly inwards: [h, w, 3].
-
-    0 without a rim; nothing is lifted or lowered by more than `_MOST_CARRIED`.
-    """
-    limited = np.where(rim[:, :, None], off, 0).astype(np.float32)
-    np.clip(limited, -_MOST_CARRIED, _MOST_CARRIED, out=limited)
-    return carried(limited, rim.astype(np.float32), spacing_px=spacing_px)
 
 
 def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:

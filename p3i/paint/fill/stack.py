@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.ground import Ground
-from p3i.paint.fill.light import membrane, rim_of
+from p3i.paint.fill.light import MOST_CARRIED, carried, rim_of
 from p3i.paint.fill.matching import trusted
 from p3i.paint.fill.mixing import feathered, painted
 from p3i.paint.fill.pieces import Piece, drawn_on, padded, pieces_of
@@ -173,7 +173,7 @@ def _carry_rim(total: Floats, shown: Mask, pixels: Floats, sure: Floats, hole: M
             continue
         spacing = pitch_px(placed, nearest_px(placed, middles[number]))
         off = np.zeros((*rim.shape, 3), np.float32)
-        off[rim] = pixels[window][rim] - total[window][rim]
-        lift = membrane(off, rim, spacing_px=spacing)
+        off[rim] = np.clip(pixels[window][rim] - total[window][rim], -MOST_CARRIED, MOST_CARRIED)
+        lift = carried(off, rim.astype(np.float32), spacing_px=spacing)
         del off
         np.add(total[window], lift, out=total[window], where=inside[..., None] > 0)

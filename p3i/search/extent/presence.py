@@ -5,6 +5,7 @@ What each cell says for an object is told by p3i.vision.cell_bits; which of them
 bit, as a claim that nobody can check.
 """
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,11 +55,26 @@ def cells_that_hold(
     grid = (box.rows, box.columns)
     bits = np.where(inside & ~found.judged, -_UNKNOWN_BITS, found.whole).reshape(grid)
     halves = found.halves.reshape(4, *grid)
+    if support is not None:
+        fitted = at_cells(support, image_from_cells, box, shape=mask.shape).reshape(grid)
+        bits = np.where(_elsewhere(bits > 0, fitted), -GUARD_BITS, bits)
     if roi is not None:
         asked = at_cells(roi, image_from_cells, box, shape=mask.shape).reshape(grid) > 0
         nothing = min(float(bits.min()), -GUARD_BITS)
         bits, halves = (np.where(asked, one, nothing) for one in (bits, halves))
     return _one_pattern(bits, halves, found.judged.reshape(grid), first=(box.i_start, box.j_start))
+
+
+def _elsewhere(passing: Mask, fitted: Floats) -> Mask:
+    """Cells [R, C] that pass, but hang together with less of what was `fitted` [R, C] than others do.
+
+    A neighbour of nearly the same step drifts in and out of the lattice's, so that its cells follow each
+    other; and it may be larger than the pattern itself. An empty cell between two parts is a gap of one.
+    """
+    wide = cv2.dilate(passing.astype(np.uint8), np.ones((3, 3), np.uint8))
+    count, parts = cv2.connectedComponents(wide, connectivity=4)
+    own = np.bincount(parts[passing], weights=fitted[passing], minlength=count)
+    return passing & (own < own.max() / 2)[parts]
 
 
 def _one_pattern(bits: Array, halves: Array, judged: Mask, *, first: tuple[int, int]) -> Cells:

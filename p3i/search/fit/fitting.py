@@ -73,7 +73,9 @@ def holds(fit: Fit, guess: Guess) -> bool:
     """Whether a fit is worth drawing: a lattice whose cells come again, more than what it began with."""
     if guess.base is not None:
         return says_more(fit, guess.base)
-    return guess.filling is not lattice_filling() or guess.settled or fit.bits > 0
+    if guess.filling is not lattice_filling() or guess.settled:
+        return True
+    return certain(fit) if guess.doubted else fit.bits > 0
 
 
 def worth(fit: Fit) -> float:

@@ -34,6 +34,7 @@ class Guess:
     `promise` is 1 for the best guess of a proposer, and less for others. `focal_mm` is the focal that they go
     with, None for the one that is assumed. `local`: they hold near the pattern's origin only. `base` is what
     they begin with, where a smaller pattern was found before. `settled`: nothing of it is to be fitted.
+    `doubted`: its fit counts only where it is certain.
     """
 
     filling: Filling
@@ -44,6 +45,7 @@ class Guess:
     local: bool = False
     base: Base | None = None
     settled: bool = False
+    doubted: bool = False
 
     @property
     def theta(self) -> Tensor:

@@ -220,7 +220,8 @@ def sectors_of(
     typical, colour = (
         float(np.median(_energy(each, seen))) if len(index) else 0.0 for each in (gradients, colours)
     )
-    untold = min(_UNTOLD + _ROUNDING / max(colour, _ROUNDING), 1.0)
+    rounded = _ROUNDING + (0.0 if edges else _left_by_squares(lab, known))
+    untold = min(_UNTOLD + rounded / max(colour, _ROUNDING), 1.0)
     return Sectors(waves.reshape(len(waves), -1, waves.shape[-1])[enough], typical, untold)
 
 
@@ -275,6 +276,23 @@ def _without_mean(values: Floats, known: Floats) -> Floats:
         weights[..., ahead] - weights[..., behind], 1e-6
     )
     return ((values[..., middle] - mean) * known[:, None][..., middle]).astype(np.float32)
+
+
+def _left_by_squares(lab: Floats, known: Floats) -> float:
+    """What squares of one colour each leave of the light's slope, as the energy of a typical sector.
+
+    Of a slope that rises by d in a step, squares as wide as the step leave a sawtooth of variance d^2 / 12:
+    it comes again as the squares do. Shapes: lab [N, B + 2, 2 * ALONG + 2, 3], known [N, B, 2 * ALONG].
+    """
+    inner, seen = lab[:, 1:-1, 1:-1], known[..., None]
+    halves = (slice(0, ALONG), slice(ALONG, 2 * ALONG))
+    before, after = (
+        (inner[:, :, part] * seen[:, :, part]).sum(2) / np.maximum(seen[:, :, part].sum(2), 1e-6)
+        for part in halves
+    )
+    both = np.minimum(*(known[..., part].mean(2) for part in halves))  # [N, B]
+    rise = ((after - before) ** 2).sum(2) / 12
+    return float(np.median((rise * both).sum(1) / np.maximum(both.sum(1), 1e-6))) if len(lab) else 0.0
 
 
 def _energy(values: Floats, known: Floats) -> Floats:

@@ -16,11 +16,14 @@ _MOST = 10
 def lattice_rounds(look: Session, best: Best) -> Iterator[Iterator[Guess]]:
     """The guesses of views and windows; where no fit of them is certain, those of windows half as wide.
 
-    A small pattern fills no window of the first kind, and what lies around it speaks there as well.
+    A small pattern fills no window of the first kind, and what lies around it speaks there as well. There are
+    four times as many such windows, and one of them shows something by chance in any picture: what comes of
+    them counts where it is certain.
     """
     yield lattice_guesses(look)
-    if not any(certain(fit) for fit in best.fits):
-        yield iter(_beside_the_best(window_guesses(look.evidence, side=SIDE // 2)[:_MOST]))
+    if look.go_on() and not any(certain(fit) for fit in best.fits):
+        guesses = _beside_the_best(window_guesses(look.evidence, side=SIDE // 2)[:_MOST])
+        yield (replace(guess, doubted=True) for guess in guesses)
 
 
 def lattice_guesses(look: Session) -> Iterator[Guess]:

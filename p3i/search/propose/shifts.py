@@ -106,9 +106,9 @@ def best_pair(
     """The two shifts between `least` and `most` pixels that best span a lattice, None where there is none.
 
     A shift's worth is its valley contrast: its value less the least on the way from zero, the less the less
-    of the view overlaps. A pair needs its
-    sum and difference too; among those nearly as good as the best, the smallest cell is taken. It is divided
-    where its parts are as alike; these may be as short as `least_part` pixels (`least` where it is None).
+    of the view overlaps. A pair needs its sum and difference too, and to save bits; among those nearly as good
+    as the best, the smallest cell is taken. It is divided where its parts are as alike; these may be as short
+    as `least_part` pixels (`least` where it is None).
     """
     shifts, worth = _peaks(found, least=least, most=most)
     if len(shifts) < 2:
@@ -125,7 +125,8 @@ def best_pair(
     nearly = np.flatnonzero(score >= _NEARLY_BEST * score.max())
     best = nearly[np.argmin(area[nearly])]
     basis = _divided(found, np.stack([u[best], v[best]]), least=least if least_part is None else least_part)
-    return ShiftPair(basis, _saved_bits(found, basis))
+    bits = _saved_bits(found, basis)
+    return ShiftPair(basis, bits) if bits > 0 else None
 
 
 def _saved_bits(found: Autocorrelation, basis: np.ndarray) -> float:

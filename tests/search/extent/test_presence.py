@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from p3i.search.extent.presence import cells_that_hold
+from p3i.search.extent.presence import _elsewhere, cells_that_hold
 
 RECTANGLE = [(i, j) for i in range(6) for j in range(8)]
 TRIANGLE = [(i, j) for i in range(6) for j in range(6) if i + j >= 5]
@@ -202,3 +202,15 @@ def test_a_plain_photo_holds_nothing(draw_scene):
 def test_a_photo_without_a_known_pixel_holds_nothing(draw_scene):
     scene = draw_scene(RECTANGLE)
     assert extent_of(scene, valid=np.zeros_like(scene.valid)) is None
+
+
+def test_of_two_parts_that_pass_the_one_that_was_fitted_is_the_pattern():
+    passing, fitted = np.zeros((12, 20), bool), np.zeros((12, 20), np.float32)
+    passing[2:8, 1:6] = True
+    passing[4, 1:6] = False  # an empty line divides nothing
+    passing[1:11, 9:19] = True  # larger, and a part of it was fitted too
+    fitted[2:8, 1:6], fitted[3:5, 10:13] = 1, 1
+    away = _elsewhere(passing, fitted)
+    assert np.array_equal(away[:, 8:], passing[:, 8:])
+    assert not away[:, :8].any()
+    assert not _elsewhere(passing, np.zeros_like(fitted)).any()

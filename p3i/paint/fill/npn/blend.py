@@ -21,7 +21,7 @@ _MOST_STRONGER = 1.5
 
 
 def blended(stack: Floats, network: Floats, where: Mask, share: float) -> Floats:
-    """The `stack`'s photo with this share (0..1) of the `network`'s in it, `where` that differs from it.
+    """The `stack`'s photo [H, W, 3] with this share (0..1) of the `network`'s `where` [H, W] it differs.
 
     There it is as sharp as the stack's is, if it can be.
     """
