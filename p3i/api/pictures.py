@@ -252,8 +252,8 @@ def edit(
 ) -> "Edited":
     """`photo` with the objects of the program `old` laid anew as the program `new` says.
 
-    Where `old` is None, it is the program that `synth` finds. What `mask` marks (as of `inpaint`: a picture or
-    bool [H, W]), and what is transparent, is filled first, and both programs go on over it. `changes` are
+    Where `old` is None, it is the program that `synth` finds. What `mask` marks (as of `inpaint`: a picture
+    or bool [H, W]), and what is transparent, is filled first, and both programs go on over it. `changes` are
     fields of EditOptions. The result has `pixels`, `touched`, `kept`, `removed`, `copied`, `filled`, `added`,
     `paint()`, `save(path)` and `notes`. Raises FileError, ParseError, UsageError, ProgramError for a program
     without objects, and NoPatternError.

@@ -106,9 +106,9 @@ def best_pair(
     """The two shifts between `least` and `most` pixels that best span a lattice, None where there is none.
 
     A shift's worth is its valley contrast: its value less the least on the way from zero, the less the less
-    of the view overlaps. A pair needs its sum and difference too, and to save bits; among those nearly as good
-    as the best, the smallest cell is taken. It is divided where its parts are as alike; these may be as short
-    as `least_part` pixels (`least` where it is None).
+    of the view overlaps. A pair needs its sum and difference too, and to save bits; among those nearly as
+    good as the best, the smallest cell is taken. It is divided where its parts are as alike; these may be as
+    short as `least_part` pixels (`least` where it is None).
     """
     shifts, worth = _peaks(found, least=least, most=most)
     if len(shifts) < 2:
