@@ -102,5 +102,4 @@ def _pinhole(size: Size, corner: tuple[int, int]) -> torch.Tensor:
 
 def _moved(laid: Placed, corner: tuple[int, int], size: Size) -> Placed:
     """A program on the flat canvas."""
-    shift = np.array([[1.0, 0, corner[0]], [0, 1, corner[1]], [0, 0, 1]])
-    return dataclasses.replace(laid, size=size, image_from_plane=shift @ laid.image_from_plane, lens_k1=None)
+    return dataclasses.replace(laid.on_canvas(corner, size), lens_k1=None)

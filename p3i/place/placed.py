@@ -44,6 +44,11 @@ class Placed:
     far: int = 0
     lens_k1: float | None = None
 
+    def on_canvas(self, corner: tuple[int, int], size: Size) -> "Placed":
+        """The same on a canvas of `size`, on which this one's corner lies at pixel `corner` (x, y)."""
+        shift = np.array([[1.0, 0, corner[0]], [0, 1, corner[1]], [0, 0, 1]])
+        return replace(self, size=size, image_from_plane=shift @ self.image_from_plane)
+
     def centers_px(self) -> tuple[np.ndarray, np.ndarray]:
         """The objects in pinhole pixels [M, 2], and which lie in front of the camera [M]."""
         return project(self.image_from_plane, self.points)

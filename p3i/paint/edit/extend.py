@@ -156,7 +156,7 @@ def extend(
     canvas = (x, y, x + size.width, y + size.height)
     unknown = on_flat(flat, hole) | ~flat.seen
     more = continued(flat.placed, flat.photo, hole=unknown, canvas=canvas)
-    wide = _wider(more.joined(laid), sides, size)
+    wide = more.joined(laid).on_canvas(sides[:2], size)
 
     pixels, known, shown = _laid_out(flat, ~unknown, sides, size)
     ground = _ground(wide)
@@ -181,7 +181,7 @@ def extend(
         pixels = pixels[window].copy()
         known, shown, bare = (one[window] for one in (known, shown, bare))
         more = _on_canvas(more, laid, kept)
-        wide = _wider(more.joined(laid), kept, grown(photo.size, kept))
+        wide = more.joined(laid).on_canvas(kept[:2], grown(photo.size, kept))
     if kept != wanted:
         notes += _cropped_note(wanted, kept)
     smooth = float(bare.sum() / max(1, (~shown).sum()))
@@ -229,12 +229,6 @@ def _on_canvas(more: Continued, laid: Placed, sides: Sides) -> Continued:
     low, high = -np.array(sides[:2]) - 0.5, np.array([size.width, size.height]) - np.array(sides[:2]) - 0.5
     on = (cells.min(1) < high).all(1) & (cells.max(1) > low).all(1)
     return dataclasses.replace(more, index=more.index[on], points=more.points[on])
-
-
-def _wider(laid: Placed, sides: Sides, size: Size) -> Placed:
-    """The program on the new canvas."""
-    shift = np.array([[1.0, 0, sides[0]], [0, 1, sides[1]], [0, 0, 1]])
-    return dataclasses.replace(laid, size=size, image_from_plane=shift @ laid.image_from_plane)
 
 
 def _ground(wide: Placed) -> Mask:

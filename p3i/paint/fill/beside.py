@@ -73,7 +73,10 @@ class Cells:
 
 
 def side_by_side(colours: Floats, seen: Mask, inside: Mask, kinds: NDArray[np.int64]) -> Cells | None:
-    """The cells beside the common one [P, 3] of their kind; None where too few are seen."""
+    """The cells beside the common one of their kind; None where too few are seen.
+
+    Colours [M, side, side, 3], `seen` [M, side, side]; `inside` [side, side] are the places of a cell.
+    """
     share = seen.sum((1, 2)) / max(int(inside.sum()), 1)
     telling = share >= LEAST_SEEN
     if telling.sum() < FEWEST:

@@ -9,7 +9,6 @@ objects are not copied to where none does; where no move lays an object wholly o
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool or float32 [H, W].
 """
 
-import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -221,9 +220,8 @@ def _apart(wanted: Mask, placed: Placed) -> list[tuple[tuple[slice, slice], Mask
 def _cropped(placed: Placed, window: tuple[slice, slice]) -> Placed:
     """The program on a part of its photo."""
     rows, columns = window
-    shift = np.array([[1.0, 0, -columns.start], [0, 1, -rows.start], [0, 0, 1]])
     size = Size(columns.stop - columns.start, rows.stop - rows.start)
-    return dataclasses.replace(placed, size=size, image_from_plane=shift @ placed.image_from_plane)
+    return placed.on_canvas((-columns.start, -rows.start), size)
 
 
 def hanging(other: Mask, wanted: Mask) -> Mask:

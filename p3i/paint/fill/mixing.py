@@ -104,15 +104,23 @@ def _sharpen(mean: Floats, shown: list[_Shown], inside: Mask) -> None:
     wanted = float(np.quantile([one.energy for one in shown if one.energy is not None], _QUANTILE))
     beyond = (lead - mean) * known[..., None]
     beyond -= cv2.GaussianBlur(beyond, (0, 0), _GRAIN_PX)
-    # The energy of mean + share * beyond is a square in the share.
     whole = inside & (known > _WHOLE)
     count = max(int(whole.sum()), 1)
     plain, square = _energy(mean, whole) / count, _energy(beyond, whole) / count
     both = _energy(mean, whole, beyond) / count
-    if plain >= wanted or square <= 0:
-        return
-    root = np.sqrt(both**2 + square * (wanted - plain))
-    mean += np.float32(min(1.0, (root - both) / square)) * beyond
+    if share := share_to_reach(wanted, plain, both, square):
+        mean += np.float32(min(1.0, share)) * beyond
+
+
+def share_to_reach(energy: float, plain: float, both: float, square: float) -> float:
+    """How much of a detail to add to a picture for this energy: of picture and detail together a square.
+
+    `plain` is the picture's own, `square` the detail's, `both` that of their product. 0 where the picture has
+    as much, or there is no detail.
+    """
+    if plain >= energy or square <= 0:
+        return 0.0
+    return float((np.sqrt(both**2 + square * (energy - plain)) - both) / square)
 
 
 def _energy(colours: Floats, where: Mask, other: Floats | None = None) -> float:

@@ -119,7 +119,7 @@ def survey_of(pixels: Floats, known: Mask, placed: Placed) -> Survey | None:
     _, _, few = cells.lit(placed.points, spacing, colours[:, *told_at])
     shown = seen[:, *told_at]
     telling = np.flatnonzero(cells.telling)
-    kinds[:] = _kinds(placed, few, shown, at, telling, together=together)
+    kinds = _kinds(placed, few, shown, at, telling, together=together)
     offs = np.zeros((len(placed.points), 2))
     information = np.zeros((len(placed.points), 2, 2))
     for turn in range(2):

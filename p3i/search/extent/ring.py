@@ -45,7 +45,7 @@ def _readings(told: list[tuple[float, Fit]], drawn: Fit) -> tuple[Reading, ...]:
     total, ours = sum(much for much, _ in speaking), values_of(drawn)
     if len(speaking) < 2 or total <= 0:
         return ()
-    step = ours.get("draw.x.angle.j", 360 / len(drawn.pattern.index))
+    step = _step_deg(drawn)
     return tuple(
         Reading(
             str(rank),
@@ -92,8 +92,13 @@ def _ring_of(look: Session, fit: Fit) -> Ring:
         center=np.array([values["draw.x.offset.1"], values["draw.y.offset.1"]]),
         radius=values["draw.x.radius.1"],
         first_deg=values["draw.x.angle.1"],
-        step_deg=values.get("draw.x.angle.j", 360 / len(fit.pattern.index)),
+        step_deg=_step_deg(fit),
         index=fit.index[:, 1].numpy(),
         weights=fit.contrast.numpy().astype(float),
         image_from_plane=seen.numpy(),
     )
+
+
+def _step_deg(fit: Fit) -> float:
+    """From one object to the next; a closed ring's is no number of its own."""
+    return values_of(fit).get("draw.x.angle.j", 360 / len(fit.pattern.index))

@@ -32,8 +32,8 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     """
     if not answers or not beyond_noise(answers[0].worth):
         return answers
-    evidence, first = session.evidence, answers[0]
-    regions, others = [_polygon(evidence, first)], []
+    evidence = session.evidence
+    met, regions = [answers[0]], [_polygon(evidence, answers[0])]
 
     def elsewhere(points: np.ndarray) -> bool:
         """Whether at most half of the points [N, 2] lie in the region of any pattern that was met."""
@@ -42,7 +42,7 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
     def keep(other: Answer) -> None:
         if beyond_noise(other.worth) and elsewhere(_centers(evidence, other)):
             regions.append(_polygon(evidence, other))
-            others.append(other)
+            met.append(other)
 
     for other in answers[1:]:
         keep(other)
@@ -54,28 +54,22 @@ def with_others(session: Session, fits: list[Fit], answers: list[Answer], *, fin
         other = finish(session, fit)
         if other is not None:
             keep(other)
-    if not others:
+    if len(met) == 1:
         return answers
-    dominant = max(first, *others, key=lambda one: _as_seen(evidence, one))
-    beside = [one for one in (first, *others) if one is not dominant]
-    told = tuple(_told(evidence, other) for other in beside)
-    rest = answers[1:] if dominant is first else [one for one in answers if one is not dominant]
-    return [dataclasses.replace(dominant, notes=(*dominant.notes, _note(told)), others=told), *rest]
-
-
-def _as_seen(evidence: Evidence, answer: Answer) -> float:
-    """What an answer is worth beside others of the photo, where it fills this part of it."""
     size = evidence.part.size
-    return as_large_as_seen(
-        answer.worth, cv2.contourArea(_polygon(evidence, answer)) / (size.width * size.height)
-    )
+    shares = [cv2.contourArea(region) / (size.width * size.height) for region in regions]
+    first = max(range(len(met)), key=lambda k: as_large_as_seen(met[k].worth, shares[k]))
+    told = tuple(_told(evidence, met[k], regions[k]) for k in range(len(met)) if k != first)
+    dominant, notes = met[first], (*met[first].notes, _note(told))
+    rest = [one for one in answers if one is not dominant]
+    return [dataclasses.replace(dominant, notes=notes, others=told), *rest]
 
 
-def _told(evidence: Evidence, answer: Answer) -> Other:
-    """An answer as what lies beside another, on the photo as it is."""
+def _told(evidence: Evidence, answer: Answer, region: np.ndarray) -> Other:
+    """An answer on its region [M, 2] as what lies beside another, on the photo as it is."""
     centers, region = (
         evidence.on_photo(torch.from_numpy(points.astype(float))).numpy()
-        for points in (_centers(evidence, answer), _polygon(evidence, answer))
+        for points in (_centers(evidence, answer), region)
     )
     x, y = np.median(centers, axis=0).tolist()
     return Other(

@@ -11,6 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.paint.fill.mixing import share_to_reach
+
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
@@ -42,12 +44,8 @@ def blended(stack: Floats, network: Floats, where: Mask, share: float) -> Floats
 
 def _stronger(mixed: Floats, fine: Floats, inside: Mask, *, energy: float) -> float:
     """How much of `fine` to add to `mixed` [h, w, 3] to give it this energy inside; 0 where it has more."""
-    # The energy of the sum is a square in what is asked for: plain + 2 share both + share^2 square.
     plain, both, square = (_energy(*pair, inside) for pair in ((mixed, mixed), (mixed, fine), (fine, fine)))
-    if plain >= energy or square <= 0:
-        return 0.0
-    found = (np.sqrt(both**2 + square * (energy - plain)) - both) / square
-    return float(np.clip(found, 0, _MOST_STRONGER - 1))
+    return min(share_to_reach(energy, plain, both, square), _MOST_STRONGER - 1)
 
 
 def _energy(one: Floats, other: Floats, inside: Mask) -> float:

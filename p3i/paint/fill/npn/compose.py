@@ -8,11 +8,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from p3i.paint.fill.ground import Ground
 from p3i.paint.fill.npn.cells import Cells
 from p3i.paint.fill.npn.network import PaintingNetwork
 from p3i.paint.fill.npn.stacks import Pool, finer, stacks_of
 from p3i.paint.fill.npn.tasks import Task
-from p3i.paint.fill.sources import Ground
 from p3i.vision.sheet import project
 from p3i.vision.warp import taken
 

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from p3i.paint.fill.ground import Floats, Ground, Mask
 from p3i.paint.fill.npn.cells import Cells, cells_of, finer
 from p3i.paint.fill.npn.compose import painted
 from p3i.paint.fill.npn.copies import FEWEST, copies
@@ -17,7 +18,6 @@ from p3i.paint.fill.npn.lessons import teachers
 from p3i.paint.fill.npn.network import PaintingNetwork
 from p3i.paint.fill.npn.stacks import Pool, pool_of
 from p3i.paint.fill.npn.tasks import Task, tasks_of
-from p3i.paint.fill.sources import Floats, Ground, Mask
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.placed import Placed
 from p3i.vision.image import Image

@@ -8,6 +8,7 @@ import torch
 from p3i.errors import UsageError
 from p3i.options.npn import NetworkOptions
 from p3i.paint.fill.filled import Filled, share_text
+from p3i.paint.fill.ground import Floats, Ground, Mask
 from p3i.paint.fill.npn import checkpoint
 from p3i.paint.fill.npn.blend import blended
 from p3i.paint.fill.npn.cells import Cells, cells_of, finer
@@ -19,7 +20,6 @@ from p3i.paint.fill.npn.shipped import shipped
 from p3i.paint.fill.npn.stacks import pool_of
 from p3i.paint.fill.npn.tasks import Task, tasks_of
 from p3i.paint.fill.npn.training import Progress, begun, train
-from p3i.paint.fill.sources import Floats, Ground, Mask
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.placed import Placed
 from p3i.vision.image import Image
