@@ -13,6 +13,8 @@ from torch import Tensor
 from p3i.interp.camera import project
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.places import measured
+from p3i.search.fit.robust import moving_limits
+from p3i.search.fit.slopes import with_slopes
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.patches import Frames, frames, offsets_grid, sample_px
 from p3i.vision.warp import sample, sample_valid
@@ -95,22 +97,18 @@ def _middle(patch: _MeanPatch) -> Tensor | None:
 
 def _moved(fit: Fit, targets: Tensor) -> Tensor:
     """The numbers z [F] that draw closest to `targets` [N, 2] (program units) under the same camera."""
-    filling = fit.filling
-    free = torch.tensor(
-        [k for k, unknown in enumerate(filling.moving) if not unknown.name.startswith("camera.")]
-    )
-    if len(free) == 0:
-        return fit.z
+    filling, z = fit.filling, fit.z
+    held = torch.tensor([unknown.name.startswith("camera.") for unknown in filling.moving])
+    limits = moving_limits(filling, z).where(~held, 0.0)
 
-    def points_of(moving: Tensor, z: Tensor) -> Tensor:
-        return filling.pattern.points_at(fit.index, filling.theta(z.index_put((free,), moving))).flatten()
+    def points_of(numbers: Tensor) -> Tensor:
+        return filling.pattern.points_at(fit.index, filling.theta(numbers))
 
-    z = fit.z
     for _ in range(3):
-        jacobian = torch.func.jacfwd(points_of)(z[free], z)
-        residual = targets.flatten() - points_of(z[free], z)
+        points, slopes = with_slopes(points_of, z, limits)
+        rows = slopes.flatten(0, 1)
         # Numbers that hardly move the draws, alone or together, stay where they are.
-        scale = jacobian.norm(dim=0).clamp(min=1e-9)
-        step = torch.linalg.pinv(jacobian / scale, rtol=1e-3) @ residual / scale
-        z = z.index_put((free,), z[free] + step)
+        scale = rows.norm(dim=0).clamp(min=1e-9)
+        step = torch.linalg.pinv(rows / scale, rtol=1e-3) @ (targets - points).flatten() / scale
+        z = z + step * limits
     return z

@@ -11,7 +11,7 @@ from p3i.search.look.recurrence import recurrence_bits
 
 def saved_bits(evidence: Evidence, fit: Fit) -> float:
     """What the objects of a fit save by coming again at its steps: look/recurrence.py."""
-    cells = sweeps_cells(fit.pattern)
+    cells = sweeps_cells(fit.pattern, fit.theta)
     return recurrence_bits(
         evidence, fit.pattern, fit.index, focal_mm=fit.focal_mm, cells=cells, theta=fit.theta
     )

@@ -4,6 +4,7 @@ Where nothing but the objects themselves lies on a ring, rotations of the whole 
 But five spots fix an ellipse, and an ellipse of known focal is one of two circles in space.
 """
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from p3i.interp.camera import Camera
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.unrolled import LONGER
+from p3i.search.look.unrolled import COUNTS, LONGER
 
 Array = NDArray[np.float64]
 
@@ -25,11 +26,15 @@ _LEAST_COSINE = 0.85
 _MOST_STRONGER = 2.5
 # Each spot is tried with this many of the spots like it, in so many draws of five.
 _FELLOWS = 16
-_DRAWS = 150
+_CLOSEST = 10
+_DRAWS = 75
 # A spot lies on an ellipse where it is this close, as a share of the ellipse's size, and in pixels.
 _CLOSE = 0.03
 _CLOSE_PX = 1.5
 _FEWEST = 5
+_NEARNESS = (1.0, 0.5, 0.25)
+# Of a spot's draws so many are looked at for even steps.
+_KEPT = 5
 # An ellipse is no longer than this beside its width, and its radius lies between these shares of the map.
 _MOST_OBLONG = 4.0
 _RADII = (0.05, 0.6)
@@ -101,8 +106,6 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
     stronger = np.maximum(strength[:, None] / strength, strength / strength[:, None])
     wider = np.maximum(spots.width[:, None] / spots.width, spots.width / spots.width[:, None])
     alike = (cosine > _LEAST_COSINE) & (stronger < _MOST_STRONGER) & (wider < _MOST_STRONGER)
-    # Strong spots tell more than weak ones, and many on one ellipse say little where there are many anyway.
-    telling = np.sqrt(strength / max(float(strength.max()), 1e-9)) / np.sqrt(np.maximum(alike.sum(1), 1))
     best: list[tuple[float, Array, NDArray]] = []
     for spot in range(len(spots.at)):
         fellows = np.flatnonzero(alike[spot])
@@ -112,15 +115,15 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         nearest = nearest[nearest != spot]
         if len(nearest) < _FEWEST - 1:
             continue
-        draws = np.argsort(generator.random((_DRAWS, len(nearest))), 1)[:, : _FEWEST - 1]
-        five = np.concatenate([np.full((_DRAWS, 1), spot), nearest[draws]], 1)
+        closest = fellows[np.argsort(np.hypot(*(spots.at[fellows] - spots.at[spot]).T))][1 : _CLOSEST + 1]
+        five = np.concatenate([_fives(spot, nearest, generator), _fives(spot, closest, generator)])
         conics = _conics(spots.at[five], longer)
-        on, misfit = _members(conics, spots.at[fellows], longer)
-        counts = on.sum(1)
-        worth = (counts - misfit) * telling[spot]
-        k = int(np.argmax(worth))
-        if counts[k] >= _FEWEST:
-            best.append((float(worth[k]), conics[k], fellows[on[k]]))
+        off, angle, share = _off_and_angles(conics, spots.at[fellows], longer)
+        bits = _bits_on(off, share)
+        for k in np.argsort(-bits)[:_KEPT]:
+            on = off[k] < 1
+            if bits[k] > 0 and on.sum() >= _FEWEST:
+                best.append((float(bits[k] + _bits_even(angle[k, on])), conics[k], fellows[on]))
     best.sort(key=lambda one: -one[0])
     found: list[Array] = []
     taken: list[set[int]] = []
@@ -133,6 +136,12 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         if len(found) >= _MOST_ELLIPSES:
             break
     return found
+
+
+def _fives(spot: int, others: NDArray, generator: np.random.Generator) -> NDArray:
+    """Draws [D, 5] of a spot and four others."""
+    draws = np.argsort(generator.random((_DRAWS, len(others))), 1)[:, : _FEWEST - 1]
+    return np.concatenate([np.full((_DRAWS, 1), spot), others[draws]], 1)
 
 
 def _conics(points: Array, longer: int) -> Array:
@@ -150,8 +159,12 @@ def _conics(points: Array, longer: int) -> Array:
     return change.T @ normed @ change
 
 
-def _members(conics: Array, points: Array, longer: int) -> tuple[NDArray[np.bool_], Array]:
-    """Which points [N, 2] lie on each conic [D, N], and a misfit in 0..1; none on what is no fair ellipse."""
+def _off_and_angles(conics: Array, points: Array, longer: int) -> tuple[Array, Array, Array]:
+    """How far points [N, 2] lie from each conic and at which angle about it, both [D, N].
+
+    Below 1 is on it, infinite from what is no fair ellipse. Angles in radians, of the ellipse made a circle.
+    The third is the share [D] of the map that is on each.
+    """
     block = conics[:, :2, :2]
     determinant = np.linalg.det(block)
     safe = np.where(np.abs(determinant) > 1e-15, determinant, 1.0)
@@ -175,11 +188,39 @@ def _members(conics: Array, points: Array, longer: int) -> tuple[NDArray[np.bool
     radius = np.sqrt(axes[:, 0] * axes[:, 1])
     fair &= (radius > _RADII[0] * longer) & (radius < _RADII[1] * longer)
     away = points[None] - center[:, None]
-    distance = np.sqrt(np.maximum(np.einsum("dni,dij,dnj->dn", away, shape, away), 0)) - 1
+    shape = np.where(fair[:, None, None], shape, np.eye(2))
+    root = np.linalg.cholesky(shape)
+    x, y = np.moveaxis(away @ root, -1, 0)
+    distance = np.hypot(x, y) - 1
     limit = _CLOSE + _CLOSE_PX / np.maximum(radius, 1.0)
-    off = np.abs(distance) / limit[:, None]
-    on = (off < 1) & fair[:, None]
-    return on, (np.where(on, off, 0).sum(1) / np.maximum(on.sum(1), 1))
+    off = np.where(fair[:, None], np.abs(distance) / limit[:, None], np.inf)
+    return off, np.arctan2(y, x), 4 * math.pi * radius**2 * limit / longer**2
+
+
+def _bits_on(off: Array, share: Array) -> Array:
+    """What speaks against chance that so many points are so near to each conic, [D] bits.
+
+    Hoeffding's bound on the tail of the binomial law, at the nearness that tells most, of five points less:
+    those fix the conic (Desolneux, Moisan and Morel, From Gestalt Theory to Image Analysis, chapter 3).
+    """
+    others = off.shape[1] - _FEWEST
+    bits = np.zeros(len(off))
+    if others <= 0:
+        return bits
+    for near in _NEARNESS:
+        by_chance = np.clip(near * share, 1e-6, 0.5)
+        on = np.clip(((off < near).sum(1) - _FEWEST) / others, 0, 1)
+        more = on * np.log2(np.maximum(on, 1e-9) / by_chance)
+        more += (1 - on) * np.log2(np.maximum(1 - on, 1e-9) / (1 - by_chance))
+        bits = np.maximum(bits, np.where(on > by_chance, others * more, 0.0))
+    return bits
+
+
+def _bits_even(angle: Array) -> float:
+    """What speaks against chance that angles [N] (radians) are steps of one turn's share, in bits (Rayleigh)."""
+    turned = np.exp(1j * np.arange(COUNTS[0], COUNTS[1] + 1)[:, None] * angle)
+    steady = float((np.abs(turned.mean(1)) ** 2).max()) * len(angle)
+    return max(0.0, steady / math.log(2) - math.log2(len(turned)))
 
 
 def _circles(conic: Array, lens: Array, focal_mm: float) -> list[tuple[Camera, Array]]:
