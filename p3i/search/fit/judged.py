@@ -65,15 +65,12 @@ class JudgedPatches:
     misfit: Callable[[], float]
 
 
-def sweeps_cells(pattern: Pattern, theta: Tensor | None = None) -> bool:
-    """Whether fractional loop indices sweep cells of the plane: rows of rows, no curves and no single row.
-
-    `theta` [P] are other numbers than the program's.
-    """
+def sweeps_cells(pattern: Pattern) -> bool:
+    """Whether fractional loop indices sweep cells of the plane: rows of rows, no curves and no single row."""
     draw = nest(pattern.program).draw
     if isinstance(draw.x, Polar) or isinstance(draw.y, Polar) or len(half_steps(pattern)) < len(HALF_STEPS):
         return False
-    return Lattice.of(pattern, pattern.theta if theta is None else theta).cell_area > _LEAST_AREA
+    return Lattice.of(pattern, pattern.theta).cell_area > _LEAST_AREA
 
 
 def judged_cells(evidence: Evidence, pattern: Pattern) -> Iterator[JudgedCells]:

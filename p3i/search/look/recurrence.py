@@ -17,7 +17,8 @@ sector, nor enlarged pixels count for more than they are.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -58,14 +59,15 @@ _FAINT = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sectors:
-    """The waves of sectors, `waves` complex [N, K, M]: K samples (rows and features) of M waves for each of
-    N.
+    """The waves of sectors, `waves` complex [R, K, M]: K samples (rows and features) of M waves for each of
+    R, of the N draws those that are `read` [N].
 
     `energy` is what is typical of their gradients before they were evened out, and `untold` the share of all
     that nothing tells.
     """
 
     waves: NDArray[np.complex64]
+    read: Tensor
     energy: float
     untold: float
 
@@ -94,29 +96,49 @@ def recurrence_bits(
     theta = pattern.theta if theta is None else theta
     every, index = len(index), index[thinned(index, MOST_READ)]
     each = every / max(len(index), 1)
-
-    edges = True
-    if cells:
-        matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-        points, _ = project(matrix, pattern.points_at(index, theta))
-        edges = not on_own_grid(evidence.on_photo(points), index)
-
-    def read(part: Tensor, along: int) -> Sectors:
-        return sectors_of(
-            evidence, pattern, part, theta, focal_mm=focal_mm, along=along, cells=cells, edges=edges
-        )
+    edges = not (cells and _on_own_grid(evidence, pattern, index, theta, focal_mm))
+    read = partial(sectors_of, evidence, pattern, theta=theta, focal_mm=focal_mm, cells=cells, edges=edges)
 
     def of_all(bits: float) -> float:
         return each * bits if bits > needed else bits
 
     if cells:
-        return of_all(min(_bits(read(index, along)) for along in (0, 1)))
+        return of_all(min(_bits(read(index=index, along=along)) for along in (0, 1)))
     along = 1 if pattern.turning is None else pattern.turning
     ring = index[:, 1 - along]
-    rings = [read(index[ring == one], along) for one in ring.unique()]
+    rings = [read(index=index[ring == one], along=along) for one in ring.unique()]
     plainest = max((one.energy for one in rings), default=0.0)
     saved = of_all(sum(_bits(one) for one in rings if one.energy >= _FAINT * plainest))
     return max(saved - UPRIGHT_BITS * pattern.upright, 0.0)
+
+
+def rows_bits(
+    evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, *, focal_mm: float
+) -> float:
+    """What cells `index` [N, 2] of a lattice under theta [P] save row by row, in bits, at least 0.
+
+    For cells that were picked because they are like all others, which makes those that come again by chance
+    look like a pattern: a row is compared with itself alone. It must come again along i and along j; the
+    fewer bits count.
+    """
+    every, index = len(index), index[thinned(index, MOST_READ)]
+    edges = not _on_own_grid(evidence, pattern, index, theta, focal_mm)
+
+    def bits(along: int) -> float:
+        sectors = sectors_of(
+            evidence, pattern, index, theta, focal_mm=focal_mm, along=along, cells=False, edges=edges
+        )
+        row = index[sectors.read, 1 - along].numpy()
+        return sum(_bits(replace(sectors, waves=sectors.waves[row == one])) for one in np.unique(row))
+
+    return every / max(len(index), 1) * min(bits(along) for along in (0, 1))
+
+
+def _on_own_grid(evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, focal_mm: float) -> bool:
+    """Whether draws [N, 2] lie on the picture's own grid."""
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    points, _ = project(matrix, pattern.points_at(index, theta))
+    return on_own_grid(evidence.on_photo(points), index)
 
 
 def _bits(sectors: Sectors) -> float:
@@ -222,7 +244,8 @@ def sectors_of(
     )
     rounded = _ROUNDING + (0.0 if edges else _left_by_squares(lab, known))
     untold = min(_UNTOLD + rounded / max(colour, _ROUNDING), 1.0)
-    return Sectors(waves.reshape(len(waves), -1, waves.shape[-1])[enough], typical, untold)
+    waves = waves.reshape(len(waves), -1, waves.shape[-1])[enough]
+    return Sectors(waves, torch.from_numpy(enough), typical, untold)
 
 
 def _points(

@@ -38,7 +38,7 @@ _KEPT = 5
 # An ellipse is no longer than this beside its width, and its radius lies between these shares of the map.
 _MOST_OBLONG = 4.0
 _RADII = (0.05, 0.6)
-_MOST_ELLIPSES = 8
+_MOST_ELLIPSES = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,7 +217,7 @@ def _bits_on(off: Array, share: Array) -> Array:
 
 
 def _bits_even(angle: Array) -> float:
-    """What speaks against chance that angles [N] (radians) are steps of one turn's share, in bits (Rayleigh)."""
+    """What speaks against chance for angles [N] (radians) at even steps of a turn, in bits (Rayleigh)."""
     turned = np.exp(1j * np.arange(COUNTS[0], COUNTS[1] + 1)[:, None] * angle)
     steady = float((np.abs(turned.mean(1)) ** 2).max()) * len(angle)
     return max(0.0, steady / math.log(2) - math.log2(len(turned)))
