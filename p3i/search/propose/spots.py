@@ -33,7 +33,7 @@ _CLOSE = 0.03
 _CLOSE_PX = 1.5
 _FEWEST = 5
 _NEARNESS = (1.0, 0.5, 0.25)
-# Of a spot's draws so many are looked at for even steps.
+# So many of a spot's draws are kept.
 _KEPT = 5
 # An ellipse is no longer than this beside its width, and its radius lies between these shares of the map.
 _MOST_OBLONG = 4.0
@@ -119,11 +119,10 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         five = np.concatenate([_fives(spot, nearest, generator), _fives(spot, closest, generator)])
         conics = _conics(spots.at[five], longer)
         off, angle, share = _off_and_angles(conics, spots.at[fellows], longer)
-        bits = _bits_on(off, share)
+        bits = _bits_on(off, share) + _bits_even(angle, off < 1)
         for k in np.argsort(-bits)[:_KEPT]:
-            on = off[k] < 1
-            if bits[k] > 0 and on.sum() >= _FEWEST:
-                best.append((float(bits[k] + _bits_even(angle[k, on])), conics[k], fellows[on]))
+            if bits[k] > 0:
+                best.append((float(bits[k]), conics[k], fellows[off[k] < 1]))
     best.sort(key=lambda one: -one[0])
     found: list[Array] = []
     taken: list[set[int]] = []
@@ -216,11 +215,19 @@ def _bits_on(off: Array, share: Array) -> Array:
     return bits
 
 
-def _bits_even(angle: Array) -> float:
-    """What speaks against chance for angles [N] (radians) at even steps of a turn, in bits (Rayleigh)."""
-    turned = np.exp(1j * np.arange(COUNTS[0], COUNTS[1] + 1)[:, None] * angle)
-    steady = float((np.abs(turned.mean(1)) ** 2).max()) * len(angle)
-    return max(0.0, steady / math.log(2) - math.log2(len(turned)))
+def _bits_even(angle: Array, on: NDArray[np.bool_]) -> Array:
+    """What speaks against chance for the angles [D, N] (radians) that are `on`, at even steps: [D] bits.
+
+    The test of Rayleigh, at the count of steps a turn that tells most.
+    """
+    each = np.where(on, np.exp(1j * angle), 0)
+    counts = np.maximum(on.sum(1), 1)
+    turned, most = each, np.zeros(len(angle))
+    for count in range(2, COUNTS[1] + 1):
+        turned = turned * each
+        if count >= COUNTS[0]:
+            most = np.maximum(most, np.abs(turned.sum(1)) ** 2 / counts)
+    return np.maximum(most / math.log(2) - math.log2(COUNTS[1] - COUNTS[0] + 1), 0)
 
 
 def _circles(conic: Array, lens: Array, focal_mm: float) -> list[tuple[Camera, Array]]:

@@ -3,13 +3,14 @@
 import cv2
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 
 from p3i.grammar.parser import parse
 from p3i.interp.compile import compile
 from p3i.search.config import SearchConfig
 from p3i.search.look.evidence import Evidence
-from p3i.search.look.recurrence import likelihood_ratio, recurrence_bits
+from p3i.search.look.recurrence import likelihood_ratio, recurrence_bits, rows_bits
 from p3i.vision.image import Image
 
 SIDE = 300
@@ -120,3 +121,47 @@ def test_stripes_are_no_rows_of_rows() -> None:
 def test_three_hundred_that_agree_a_little_save_more_than_six_that_agree_well() -> None:
     assert 300 * 0.1 > 6 and likelihood_ratio(0.1, 300) > likelihood_ratio(0.9, 6)
     assert likelihood_ratio(1 / 12, 12) == pytest.approx(0, abs=1e-9)
+
+
+def rows_saved(evidence: Evidence, step: float, index: NDArray) -> float:
+    pattern = compile(parse(f"SetCameraPose(rx=0, ry=0)\n{rows(step)}\n"))
+    return rows_bits(evidence, pattern, torch.from_numpy(index).double(), pattern.theta, focal_mm=35.0)
+
+
+def test_cells_that_were_picked_for_being_alike_save_little_by_rows() -> None:
+    side, count = 10, 7  # pixels of a cell, and cells a side of `rows`
+    grey = noise(5, blur=2.0)
+    middle = (SIDE - 1) / 2
+    i, j = (one.ravel() for one in np.mgrid[-11:18, -11:18])
+    # Cell (i, j) of `rows(side in units)` is centred at these pixels.
+    at = np.stack([i, j], 1) * side - side * (count - 1) / 2 + middle
+    cells = np.stack(
+        [cv2.getRectSubPix(grey.astype(np.float32), (side, side), (x, y)).ravel() for x, y in at]
+    )
+    cells -= cells.mean(1, keepdims=True)
+    template = cells[400]
+    for _ in range(4):
+        alike = cells @ template / np.linalg.norm(cells, axis=1) / np.linalg.norm(template)
+        best = np.argsort(-alike)[:24]
+        template = cells[best].mean(0)
+    picked = np.stack([i, j], 1)[best]
+    evidence, step = picture(grey), side / SIDE * 100
+    pattern = compile(parse(f"SetCameraPose(rx=0, ry=0)\n{rows(step)}\n"))
+    as_one = recurrence_bits(evidence, pattern, torch.from_numpy(picked).double(), focal_mm=35.0, cells=True)
+    assert as_one > 2 * CHANCE
+    assert rows_saved(evidence, step, picked) < CHANCE
+
+
+def test_rows_come_again_along_both_steps_or_not_at_all() -> None:
+    generator = np.random.default_rng(2)
+    lattice, bars = np.full((SIDE, SIDE), 0.7), np.full((SIDE, SIDE), 0.7)
+    index = np.stack(np.meshgrid(np.arange(7), np.arange(7), indexing="ij"), -1).reshape(-1, 2)
+    at = (index - 3) * 30 + (SIDE - 1) / 2
+    for x, y in at:
+        cv2.circle(lattice, (round(x), round(y)), 7, 0.1, -1, cv2.LINE_AA)
+    for y in np.unique(at[:, 1]):  # what each row has is its own, and does not come again in it
+        shown = generator.uniform(0.2, 0.9, 12)
+        for k, x in enumerate(np.linspace(20, SIDE - 20, 12)):
+            cv2.circle(bars, (round(x + generator.uniform(-8, 8)), round(y)), 7, shown[k], -1, cv2.LINE_AA)
+    assert rows_saved(picture(lattice + 0.02 * (noise(3) - 0.5)), 10, index) > 200
+    assert rows_saved(picture(bars + 0.02 * (noise(3) - 0.5)), 10, index) < CHANCE
