@@ -48,7 +48,7 @@ _SAME_CENTRE = 0.03
 _MOST_CENTRES = 16
 _POSES_A_CENTRE = 3
 # From so many centres the search climbs to the best pose and centre near by.
-_MOST_CLIMBED = 5
+_MOST_CLIMBED = 8
 # A circle of spots is worth as much as a centre with so many votes.
 _SPOTS_WORTH = 0.15
 # The first steps of the climb: degrees, and the centre's as a share of the radius; and how many rounds.
@@ -117,13 +117,27 @@ def _ring_guesses(look: Session, evidence: Evidence) -> list[Guess]:
     for camera, center_px in circles(evidence, np.random.default_rng(look.config.seed)):
         vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, center_px)
         centres.append((vote, _rows_about(evidence, vote)))
-    centres.sort(key=_promise, reverse=True)
     found: list[Guess] = []
-    for vote, rows in centres[:_MOST_CLIMBED]:
-        if rows:
-            vote = _climbed(evidence, vote, rows[0])
-            found += [_guess(evidence, vote, row) for row in _rows_about(evidence, vote)]
+    for vote, rows in _apart(centres, evidence.part.size.longer)[:_MOST_CLIMBED]:
+        vote = _climbed(evidence, vote, rows[0])
+        found += [_guess(evidence, vote, row) for row in _rows_about(evidence, vote)]
     return _distinct(sorted(found, key=lambda guess: -guess.promise))
+
+
+def _apart(centres: list[tuple[Vote, list[Rows]]], longer: int) -> list[tuple[Vote, list[Rows]]]:
+    """Those about which there are rows, the most promising first, and no two so close that they climb to one
+    place.
+    """
+    kept: list[tuple[Vote, list[Rows]]] = []
+    for vote, rows in sorted(centres, key=_promise, reverse=True):
+        near = (
+            np.hypot(*(vote.center_px - other.center_px)) < _SAME_CENTRE * longer
+            and math.hypot(vote.rx_deg - other.rx_deg, vote.ry_deg - other.ry_deg) < _POSE_STEP_DEG
+            for other, _ in kept
+        )
+        if rows and not any(near):
+            kept.append((vote, rows))
+    return kept
 
 
 def _guess(evidence: Evidence, vote: Vote, row: Rows) -> Guess:
