@@ -53,10 +53,11 @@ def same_lattice(evidence: Evidence, fit: Fit, other: Fit) -> bool:
     return _whole_multiple(first, second) and _whole_multiple(second, first)
 
 
-def same_ring(one: Guess | Fit, other: Guess | Fit) -> bool:
+def same_ring(one: Guess | Fit, other: Guess | Fit, *, any_circle: bool = False) -> bool:
     """Whether two rings of one sketch lie so close that fits of them end at the same numbers.
 
-    Of rings in rings the first one is compared, and how the others follow it.
+    Of rings in rings the first one is compared, and how the others follow it. `any_circle`: it may be another
+    circle about the same centre, as it is drawn on the one where its objects are.
     """
     if one.filling.sketch != other.filling.sketch:
         return False
@@ -70,7 +71,7 @@ def same_ring(one: Guess | Fit, other: Guess | Fit) -> bool:
     near = _SAME_SHARE * theirs["draw.x.radius.1"]
     return (
         apart("draw.x.offset.", "draw.y.offset.") < near
-        and apart("draw.x.radius.") < near
+        and (any_circle or apart("draw.x.radius.") < near)
         and apart("camera.") < _SAME_POSE_DEG
     )
 

@@ -96,7 +96,7 @@ def recurrence_bits(
     theta = pattern.theta if theta is None else theta
     every, index = len(index), index[thinned(index, MOST_READ)]
     each = every / max(len(index), 1)
-    edges = not (cells and _on_own_grid(evidence, pattern, index, theta, focal_mm))
+    edges = not (cells and lie_on_own_grid(evidence, pattern, index, theta, focal_mm))
     read = partial(sectors_of, evidence, pattern, theta=theta, focal_mm=focal_mm, cells=cells, edges=edges)
 
     def of_all(bits: float) -> float:
@@ -113,16 +113,15 @@ def recurrence_bits(
 
 
 def rows_bits(
-    evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, *, focal_mm: float
+    evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, *, focal_mm: float, edges: bool = True
 ) -> float:
     """What cells `index` [N, 2] of a lattice under theta [P] save row by row, in bits, at least 0.
 
     For cells that were picked because they are like all others, which makes those that come again by chance
     look like a pattern: a row is compared with itself alone. It must come again along i and along j; the
-    fewer bits count.
+    fewer bits count. By colours alone without `edges`.
     """
     every, index = len(index), index[thinned(index, MOST_READ)]
-    edges = not _on_own_grid(evidence, pattern, index, theta, focal_mm)
 
     def bits(along: int) -> float:
         sectors = sectors_of(
@@ -134,7 +133,7 @@ def rows_bits(
     return every / max(len(index), 1) * min(bits(along) for along in (0, 1))
 
 
-def _on_own_grid(evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, focal_mm: float) -> bool:
+def lie_on_own_grid(evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, focal_mm: float) -> bool:
     """Whether draws [N, 2] lie on the picture's own grid."""
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
     points, _ = project(matrix, pattern.points_at(index, theta))
