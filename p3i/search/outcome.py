@@ -16,7 +16,7 @@ from p3i.search.optics.focal import with_own_focal
 from p3i.search.optics.mirrored import ambiguity_note, mirrored_camera
 from p3i.search.optics.printed import briefly
 from p3i.search.optics.tilt import doubt_note, pose_sigma_deg
-from p3i.search.readings import offers, other_readings, reading_notes
+from p3i.search.readings import offers, on_asked_circle, other_readings, reading_notes
 from p3i.search.result import FOCAL_REASONS, Candidate, FocalSource, StopReason, SynthesisResult
 from p3i.vision.image import Image
 
@@ -44,7 +44,8 @@ def outcome(look: Session, answers: list[Answer], *, assumed: tuple[float, Focal
         facts = {"bits": bits, "least_period_px": look.evidence.least_period_px, "needed": needed}
         return _refused(look, assumed, look.stopped or reason, best, **facts)
     good = distinct_answers(good, image=image, focal_mm=focal_mm)
-    first = good[0]
+    first = on_asked_circle(look, good[0])
+    good = [first, *good[1:]]
     if not offers(first, config):
         return _refused(look, assumed, StopReason.NO_SUCH_OBJECT, first.score, readings=first.readings)
     elsewhere = other_readings(look, first, most=config.top - 1)

@@ -58,6 +58,15 @@ def other_readings(session: Session, answer: Answer, *, most: int) -> list[Answe
     return list(itertools.islice(_others(session, answer), most)) if answer.lens_k1 is None else []
 
 
+def on_asked_circle(session: Session, answer: Answer) -> Answer:
+    """A ring with its objects on the circle that the options ask for, where it has that one."""
+    asked = session.config.object
+    if asked is None or answer.structure != "circular":
+        return answer
+    each = (answer, *other_readings(session, answer, most=len(answer.readings)))
+    return next((one for one in each if _is(_drawn(one), asked, one)), answer)
+
+
 def _others(session: Session, answer: Answer) -> Iterator[Answer]:
     evidence = session.evidence.under(answer.focal_mm or session.evidence.focal_mm)
     moved = _lattice_on if answer.structure == "lattice" else _ring_on

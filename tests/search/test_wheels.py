@@ -10,10 +10,14 @@ import p3i
 from p3i.interp.camera import Camera
 from p3i.interp.unroll import points
 from p3i.search.config import SearchConfig
+from p3i.search.extent.ring import drawn_ring
+from p3i.search.fit.places import fitted
+from p3i.search.forms.filling import standing
+from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
 from p3i.search.result import SynthesisResult
-from p3i.search.synthesize import searched, synthesize
+from p3i.search.synthesize import synthesize
 from p3i.size import Size
 
 WHEEL = DrawnRing(
@@ -46,9 +50,19 @@ def test_the_gondolas_of_a_wheel_are_found_where_they_hang() -> None:
 
 def test_a_ring_of_upright_objects_is_as_sure_as_it_is_plain() -> None:
     """Moved to its objects' middles it kept no misfit of its places, which counted as the worst."""
-    look = Session(Evidence(WHEEL.image(), SearchConfig(structure="circular"), 35.0), SearchConfig())
-    surest = max(drawn.sure for drawn in searched(look).rings())
-    assert surest > 0.5
+    look = Session(Evidence(WHEEL.image(), SearchConfig(), 35.0), SearchConfig())
+    filling = standing(ring_filling(WHEEL.count), upright=True)
+    near = {  # the true numbers, but for a part of a gondola
+        "camera.rx": WHEEL.rx_deg,
+        "camera.ry": WHEEL.ry_deg,
+        "draw.x.radius.1": WHEEL.radius + 1,
+        "draw.x.angle.1": WHEEL.first_deg + 2,
+        "draw.x.offset.1": WHEEL.center[0],
+        "draw.y.offset.1": WHEEL.center[1],
+    }
+    fit = fitted(look, filling, near, focal_mm=35.0, rounds=4)
+    assert fit is not None
+    assert drawn_ring(look, fit).sure > 0.5
 
 
 def test_a_wheel_says_in_its_header_that_its_objects_hang_and_none_is_absent() -> None:

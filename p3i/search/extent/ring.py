@@ -21,7 +21,7 @@ _MOST_PLACES = 2
 def drawn_ring(look: Session, fit: Fit) -> Drawn:
     """The ring with its draws where the objects sit: where most comes again, and stands out.
 
-    The circles that speak for themselves are its readings; the options may ask for one of them.
+    The circles that speak for themselves are its readings.
     """
     evidence = look.evidence
     if fit.pattern.upright:
@@ -34,8 +34,7 @@ def drawn_ring(look: Session, fit: Fit) -> Drawn:
     if not told:
         return Drawn(fit.program(), fit, curve_score(fit))
     told.sort(key=lambda one: -one[0])
-    asked = look.config.object
-    drawn = told[next((k for k in range(len(told)) if str(k + 1) == asked), 0)][1]
+    drawn = told[0][1]
     return Drawn(drawn.program(), drawn, curve_score(drawn), readings=_readings(told, drawn))
 
 

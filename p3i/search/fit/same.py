@@ -1,6 +1,4 @@
-"""Whether two lattices are the same, or one a multiple of the other; whether two rings are."""
-
-import math
+"""Whether two lattices are the same, or one a multiple of the other."""
 
 import numpy as np
 
@@ -11,9 +9,6 @@ from p3i.search.forms.lattice import Lattice, map_from_index
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.evidence import Evidence
 
-# Rings are one where centre and radius differ by less than this share of the radius, and poses by less.
-_SAME_SHARE = 0.04
-_SAME_POSE_DEG = 3.0
 # Guesses of several rings are one where their radii differ by less than this share of the growth.
 _SAME_GROWTH = 0.1
 
@@ -51,29 +46,6 @@ def same_lattice(evidence: Evidence, fit: Fit, other: Fit) -> bool:
     at = ours @ [*fit.index[fit.support].median(0).values.tolist(), 1.0]
     first, second = (_steps_at(one, at[:2] / at[2]) for one in (ours, theirs))
     return _whole_multiple(first, second) and _whole_multiple(second, first)
-
-
-def same_ring(one: Guess | Fit, other: Guess | Fit, *, any_circle: bool = False) -> bool:
-    """Whether two rings of one sketch lie so close that fits of them end at the same numbers.
-
-    Of rings in rings the first one is compared, and how the others follow it. `any_circle`: it may be another
-    circle about the same centre, as it is drawn on the one where its objects are.
-    """
-    if one.filling.sketch != other.filling.sketch:
-        return False
-    ours, theirs = (each.filling.named(each.z) for each in (one, other))
-    if "draw.x.radius.1" not in ours:
-        return False
-
-    def apart(*kinds: str) -> float:
-        return math.hypot(*(ours[name] - theirs[name] for name in ours if name.startswith(kinds)))
-
-    near = _SAME_SHARE * theirs["draw.x.radius.1"]
-    return (
-        apart("draw.x.offset.", "draw.y.offset.") < near
-        and (any_circle or apart("draw.x.radius.") < near)
-        and apart("camera.") < _SAME_POSE_DEG
-    )
 
 
 def _one_divides_the_other(a: np.ndarray, b: np.ndarray, point: np.ndarray) -> bool:

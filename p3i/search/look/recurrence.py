@@ -133,7 +133,9 @@ def rows_bits(
     return every / max(len(index), 1) * min(bits(along) for along in (0, 1))
 
 
-def lie_on_own_grid(evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, focal_mm: float) -> bool:
+def lie_on_own_grid(
+    evidence: Evidence, pattern: Pattern, index: Tensor, theta: Tensor, focal_mm: float
+) -> bool:
     """Whether draws [N, 2] lie on the picture's own grid."""
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
     points, _ = project(matrix, pattern.points_at(index, theta))
