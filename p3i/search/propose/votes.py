@@ -117,13 +117,29 @@ def _ring_guesses(look: Session, evidence: Evidence) -> list[Guess]:
     for camera, center_px in circles(evidence, np.random.default_rng(look.config.seed)):
         vote = Vote(_SPOTS_WORTH, camera.rx_deg, camera.ry_deg, center_px)
         centres.append((vote, _rows_about(evidence, vote)))
-    centres.sort(key=_promise, reverse=True)
     found: list[Guess] = []
-    for vote, rows in centres[:_MOST_CLIMBED]:
-        if rows:
-            vote = _climbed(evidence, vote, rows[0])
-            found += [_guess(evidence, vote, row) for row in _rows_about(evidence, vote)]
+    for vote, rows in _apart(centres, evidence.part.size.longer)[:_MOST_CLIMBED]:
+        vote = _climbed(evidence, vote, rows[0])
+        found += [_guess(evidence, vote, row) for row in _rows_about(evidence, vote)]
     return _distinct(sorted(found, key=lambda guess: -guess.promise))
+
+
+def _apart(centres: list[tuple[Vote, list[Rows]]], longer: int) -> list[tuple[Vote, list[Rows]]]:
+    """Those about which there are rows, the most promising first, and of those close to each other one.
+
+    Else most climbs would begin at one place: many votes and ellipses are of the same ring, or of one that
+    only seems to be.
+    """
+    kept: list[tuple[Vote, list[Rows]]] = []
+    for vote, rows in sorted(centres, key=_promise, reverse=True):
+        near = (
+            np.hypot(*(vote.center_px - other.center_px)) < _SAME_CENTRE * longer
+            and math.hypot(vote.rx_deg - other.rx_deg, vote.ry_deg - other.ry_deg) < _POSE_STEP_DEG
+            for other, _ in kept
+        )
+        if rows and not any(near):
+            kept.append((vote, rows))
+    return kept
 
 
 def _guess(evidence: Evidence, vote: Vote, row: Rows) -> Guess:
