@@ -10,7 +10,7 @@ from torch import Tensor
 
 # Objects this near to the corners of such squares, in sides (root mean square), lie on them; by chance they
 # are off by 0.4.
-_NEAR = 0.1
+_NEAR = 0.15
 # A step goes over so many squares at most, to the side and down.
 _MOST_SQUARES = 3
 
