@@ -11,10 +11,11 @@ from p3i.search.fit.best import Best
 from p3i.search.forms.guess import Guess
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.session import Session
+from p3i.search.look.unrolled import Rows
 from p3i.search.propose import votes as ring
 from p3i.search.propose.poses import pose_grid
 from p3i.search.propose.views import gradient_tensor
-from p3i.search.propose.votes import Vote, ring_rounds, rotation_votes
+from p3i.search.propose.votes import Vote, _apart, ring_rounds, rotation_votes
 
 RING = DrawnRing()
 
@@ -105,3 +106,14 @@ def test_a_long_focal_is_tried_where_nobody_stated_one_and_no_closed_ring_was_fo
     assert len(told) == focals
     assert told[0] == {stated or 35.0}
     assert all(mm is not None and mm > 80 for later in told[1:] for mm in later)
+
+
+def test_climbs_begin_apart_and_where_there_are_rows() -> None:
+    def centre(x: float, rx_deg: float, worth: float, *, rows: bool = True) -> tuple[Vote, list[Rows]]:
+        vote = Vote(worth, rx_deg, 0.0, np.array([x, 200.0]))
+        return vote, [Rows(8, 20.0, 0.5)] if rows else []
+
+    best, beside, turned = centre(300, 0, 0.4), centre(310, 5, 0.3), centre(305, 40, 0.2)
+    far, empty = centre(600, 0, 0.1), centre(500, 0, 0.9, rows=False)
+    kept = _apart([far, beside, empty, turned, best], longer=1000)
+    assert [vote for vote, _ in kept] == [vote for vote, _ in (best, turned, far)]
