@@ -26,15 +26,11 @@ _LEAST_COSINE = 0.85
 _MOST_STRONGER = 2.5
 # Each spot is tried with this many of the spots like it, in so many draws of five.
 _FELLOWS = 16
-_CLOSEST = 10
 _DRAWS = 75
 # A spot lies on an ellipse where it is this close, as a share of the ellipse's size, and in pixels.
 _CLOSE = 0.03
 _CLOSE_PX = 1.5
 _FEWEST = 5
-_NEARNESS = (1.0, 0.5, 0.25)
-# So many of a spot's draws are kept.
-_KEPT = 5
 # An ellipse is no longer than this beside its width, and its radius lies between these shares of the map.
 _MOST_OBLONG = 4.0
 _RADII = (0.05, 0.6)
@@ -115,14 +111,12 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         nearest = nearest[nearest != spot]
         if len(nearest) < _FEWEST - 1:
             continue
-        closest = fellows[np.argsort(np.hypot(*(spots.at[fellows] - spots.at[spot]).T))][1 : _CLOSEST + 1]
+        closest = fellows[np.argsort(np.hypot(*(spots.at[fellows] - spots.at[spot]).T))][1:_FELLOWS]
         five = np.concatenate([_fives(spot, nearest, generator), _fives(spot, closest, generator)])
         conics = _conics(spots.at[five], longer)
         off, angle, share = _off_and_angles(conics, spots.at[fellows], longer)
         bits = _bits_on(off, share) + _bits_even(angle, off < 1)
-        for k in np.argsort(-bits)[:_KEPT]:
-            if bits[k] > 0:
-                best.append((float(bits[k]), conics[k], fellows[off[k] < 1]))
+        best += [(float(bits[k]), conics[k], fellows[off[k] < 1]) for k in np.flatnonzero(bits > 0)]
     best.sort(key=lambda one: -one[0])
     found: list[Array] = []
     taken: list[set[int]] = []
@@ -206,7 +200,7 @@ def _bits_on(off: Array, share: Array) -> Array:
     bits = np.zeros(len(off))
     if others <= 0:
         return bits
-    for near in _NEARNESS:
+    for near in (1.0, 0.5, 0.25):
         by_chance = np.clip(near * share, 1e-6, 0.5)
         on = np.clip(((off < near).sum(1) - _FEWEST) / others, 0, 1)
         more = on * np.log2(np.maximum(on, 1e-9) / by_chance)
