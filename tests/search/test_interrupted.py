@@ -130,7 +130,7 @@ IN_A_CALL = [
     ("lattice", "synthesize.with_others", 1),
     ("ring", "synthesize.fit_places", 2),
     ("ring", "fit.fitting.as_far_as_it_goes", 1),
-    ("ring", "extent.ring.places", 2),
+    ("ring", "extent.ring.places", 1),
     ("hybrid", "synthesize.fit_places", 2),
     ("hybrid", "extent.further_rings._one_more", 1),
     ("hybrid", "fit.fitting.measured", 2),
