@@ -19,7 +19,7 @@ from p3i.search.extent.layout import proposed, supported
 from p3i.search.fit.best import Best
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.fitting import certain, fit_places, holds, worth
-from p3i.search.fit.same import same_lattice, same_ring, says_already
+from p3i.search.fit.same import same_lattice, says_already
 from p3i.search.forms.asked import asks_for_itself, check_asked
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.sketches import Sketched, sketches
@@ -32,7 +32,7 @@ from p3i.search.look.session import TRACE_VERSION, Progress, Session, Trace
 from p3i.search.optics.curve_focal import with_paid_focal
 from p3i.search.optics.lens import through_lens, with_lens
 from p3i.search.outcome import focal_of, outcome, told
-from p3i.search.propose.proposers import RINGS, Proposer, proposers, share_of_time
+from p3i.search.propose.proposers import Proposer, proposers, share_of_time
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.vision.image import Image
 from p3i.vision.threads import limited_threads
@@ -175,8 +175,6 @@ def _rivals(
     for guess, fit in fits:
         if len(drawn) - before >= max(most, top) or (len(drawn) > before and not look.go_on()):
             return
-        if sketch.shape in RINGS.writes and any(same_ring(fit, other) for other in drawn):
-            continue
         answers = best.of(sketch)
         if sketch.by_hand is None and any(beyond_noise(answer.worth) for answer in answers):
             if len(answers) >= top and worth(fit) < _RIVAL * max(map(worth, drawn)):

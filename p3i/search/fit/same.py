@@ -1,6 +1,4 @@
-"""Whether two lattices are the same, or one a multiple of the other; whether two rings are."""
-
-import math
+"""Whether two lattices are the same, or one a multiple of the other."""
 
 import numpy as np
 
@@ -11,10 +9,6 @@ from p3i.search.forms.lattice import Lattice, map_from_index
 from p3i.search.forms.spelled import lattice_filling
 from p3i.search.look.evidence import Evidence
 
-# Rings are one where centre and radius differ by less than this share of the radius, and poses by less.
-_SAME_SHARE = 0.04
-_SAME_POSE_DEG = 3.0
-_RING = {"draw.x.radius.1", "draw.x.offset.1", "draw.y.offset.1", "camera.rx", "camera.ry"}
 # Guesses of several rings are one where their radii differ by less than this share of the growth.
 _SAME_GROWTH = 0.1
 
@@ -52,25 +46,6 @@ def same_lattice(evidence: Evidence, fit: Fit, other: Fit) -> bool:
     at = ours @ [*fit.index[fit.support].median(0).values.tolist(), 1.0]
     first, second = (_steps_at(one, at[:2] / at[2]) for one in (ours, theirs))
     return _whole_multiple(first, second) and _whole_multiple(second, first)
-
-
-def same_ring(one: Guess | Fit, other: Guess | Fit) -> bool:
-    """Whether two rings of one sketch lie so close that fits of them end at the same numbers."""
-    if one.filling.sketch != other.filling.sketch:
-        return False
-    ours, theirs = (each.filling.named(each.z) for each in (one, other))
-    if ours.keys() != theirs.keys() or not ours.keys() >= _RING:
-        return False
-
-    def apart(*names: str) -> float:
-        return math.hypot(*(ours[name] - theirs[name] for name in names))
-
-    near = _SAME_SHARE * theirs["draw.x.radius.1"]
-    return (
-        apart("draw.x.offset.1", "draw.y.offset.1") < near
-        and apart("draw.x.radius.1") < near
-        and apart("camera.rx", "camera.ry") < _SAME_POSE_DEG
-    )
 
 
 def _one_divides_the_other(a: np.ndarray, b: np.ndarray, point: np.ndarray) -> bool:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from p3i.interp.camera import image_from_plane
 from p3i.search.fit.best import Best
 from p3i.search.fit.places import FOCALS_MM, numbers_of
-from p3i.search.fit.same import same_ring
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.spelled import ring_filling
 from p3i.search.look.evidence import Evidence
@@ -56,6 +55,9 @@ _SPOTS_WORTH = 0.15
 _STEP_DEG = 6.0
 _STEP_SHARE = 0.08
 _CLIMBS = 6
+# Proposals are one where centre and radius differ by less than this share of the radius, and poses by less.
+_SAME_SHARE = 0.04
+_SAME_POSE_DEG = 3.0
 # Proposals worth less than this share of the best are not told.
 _LEAST_SHARE = 0.03
 
@@ -162,10 +164,26 @@ def _distinct(guesses: list[Guess]) -> list[Guess]:
     """
     kept: list[Guess] = []
     for one in guesses:
-        said = any(same_ring(one, other) for other in kept)
-        if not said and one.promise > _LEAST_SHARE * guesses[0].promise:
+        if one.promise > _LEAST_SHARE * guesses[0].promise and not any(_same(one, other) for other in kept):
             kept.append(one)
     return [replace(one, promise=one.promise / guesses[0].promise) for one in kept]
+
+
+def _same(one: Guess, other: Guess) -> bool:
+    """Whether two guesses are so close that their fits end at the same ring."""
+    if one.filling.sketch != other.filling.sketch:
+        return False
+    ours, theirs = (guess.filling.named(guess.z) for guess in (one, other))
+
+    def apart(*names: str) -> float:
+        return math.hypot(*(ours[name] - theirs[name] for name in names))
+
+    near = _SAME_SHARE * theirs["draw.x.radius.1"]
+    return (
+        apart("draw.x.offset.1", "draw.y.offset.1") < near
+        and apart("draw.x.radius.1") < near
+        and apart("camera.rx", "camera.ry") < _SAME_POSE_DEG
+    )
 
 
 def _promise(centre: tuple[Vote, list[Rows]]) -> float:
