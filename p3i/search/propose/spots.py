@@ -24,7 +24,8 @@ _MOST_SPOTS = 70
 # as do their widths.
 _LEAST_COSINE = 0.85
 _MOST_STRONGER = 2.5
-# Each spot is tried with this many of the spots like it, in so many draws of five.
+# Each spot is tried with this many of the spots like it and with half as many of the nearest, in so many
+# draws of five each.
 _FELLOWS = 16
 _DRAWS = 75
 # A spot lies on an ellipse where it is this close, as a share of the ellipse's size, and in pixels.
@@ -111,12 +112,17 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         nearest = nearest[nearest != spot]
         if len(nearest) < _FEWEST - 1:
             continue
-        closest = fellows[np.argsort(np.hypot(*(spots.at[fellows] - spots.at[spot]).T))][1:_FELLOWS]
+        closest = fellows[np.argsort(np.hypot(*(spots.at[fellows] - spots.at[spot]).T))][
+            1 : _FELLOWS // 2 + 1
+        ]
         five = np.concatenate([_fives(spot, nearest, generator), _fives(spot, closest, generator)])
         conics = _conics(spots.at[five], longer)
         off, angle, share = _off_and_angles(conics, spots.at[fellows], longer)
         bits = _bits_on(off, share) + _bits_even(angle, off < 1)
-        best += [(float(bits[k]), conics[k], fellows[off[k] < 1]) for k in np.flatnonzero(bits > 0)]
+        # As many of its draws as fix an ellipse are kept: one spot is on few rings.
+        for k in np.argsort(-bits)[:_FEWEST]:
+            if bits[k] > 0:
+                best.append((float(bits[k]), conics[k], fellows[off[k] < 1]))
     best.sort(key=lambda one: -one[0])
     found: list[Array] = []
     taken: list[set[int]] = []
