@@ -144,7 +144,7 @@ def edit(
         said.append(f"for {part} the program has nothing like it: " + _what_of(bare, hidden))
     return Edited(
         photo,
-        np.where(touched[:, :, None], pixels, photo.pixels).astype(np.float32),
+        np.where(touched[:, :, None], pixels, photo.pixels),
         touched,
         *counts,
         filled=filled,

@@ -3,9 +3,13 @@
 Convention: K places around a hole with colours [K, 3] (RGB in 0..1) and weights [K] by nearness.
 """
 
+from collections.abc import Callable, Iterator
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from p3i.vision.strips import Window, strips_of, wider_by, within
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -24,6 +28,10 @@ _SCALES = (0.5, 1.0, 2.0, 4.0)
 # Where the finest smoothing is over this many pixels the rim is reduced first, until it is over so many.
 _COARSE_SIGMA = 16.0
 _LEAST_SIGMA = 4.0
+_FINEST_PX = 0.7
+# Parts of a picture that are carried into apart, and how far, in sigmas, a bell reaches.
+_PART_PX = 1024
+_REACH = 4.0
 
 
 def matched_light(
@@ -61,22 +69,69 @@ def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:
 
     `rim` [h, w] is 1 on the rim, else 0; `spacing_px` is how far the next object lies. 0 without a rim.
     """
-    height, width = rim.shape
-    finest = _SCALES[0] * _SMOOTH * spacing_px
-    if finest >= _COARSE_SIGMA:
-        # What is smooth over so many pixels is known from a reduced picture as well.
-        reduce = 2 ** int(np.log2(finest / _LEAST_SIGMA))
-        size = (-(-width // reduce), -(-height // reduce))
-        small, small_rim = (
-            np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.float32)
-            for plane in (off, rim)
-        )
-        found = carried(small, small_rim, spacing_px=spacing_px / reduce)
-        return np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
     total, weight = np.zeros_like(off), np.zeros_like(rim)
     for scale in _SCALES:
-        sigma = max(0.7, scale * _SMOOTH * spacing_px)
+        sigma = max(_FINEST_PX, scale * _SMOOTH * spacing_px)
         for plane, summed in ((off, total), (rim, weight)):
             summed += cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / scale
     fading = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
     return (total * fading[:, :, None]).astype(np.float32)
+
+
+def carried_into(
+    read: Callable[[Window], tuple[Floats, NDArray[np.bool_]]], shape: tuple[int, int], *, spacing_px: float
+) -> Iterator[tuple[Window, Floats]]:
+    """`carried` for a picture [h, w] of any size, part by part: where, and what is to be added there.
+
+    `read` gives what the rim lacks in a window, 0 beside the rim, and the rim. Parts that nothing is carried
+    into are left out.
+    """
+    height, width = shape
+    finest = _SCALES[0] * _SMOOTH * spacing_px
+    if finest >= _COARSE_SIGMA:
+        yield from _carried_coarsely(read, shape, 2 ** int(np.log2(finest / _LEAST_SIGMA)), spacing_px)
+        return
+    reach = int(np.ceil(_REACH * max(_FINEST_PX, _SCALES[-1] * _SMOOTH * spacing_px))) + 1
+    for rows in strips_of(height, _PART_PX):
+        for columns in strips_of(width, _PART_PX):
+            wider = wider_by((rows, columns), reach, shape)
+            off, rim = read(wider)
+            if rim.any():
+                found = carried(off, rim.astype(np.float32), spacing_px=spacing_px)
+                yield (rows, columns), found[within((rows, columns), wider)]
+
+
+def _carried_coarsely(
+    read: Callable[[Window], tuple[Floats, NDArray[np.bool_]]],
+    shape: tuple[int, int],
+    reduce: int,
+    spacing_px: float,
+) -> Iterator[tuple[Window, Floats]]:
+    """What is smooth over many pixels is known from a picture `reduce` times smaller as well."""
+    height, width = shape
+    size = -(-height // reduce), -(-width // reduce)
+    small, small_rim = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
+    every = slice(0, width)
+    parts = list(strips_of(height, max(reduce, _PART_PX // 4 // reduce * reduce)))
+    for rows in parts:
+        off, rim = read((rows, every))
+        if rim.any():
+            to = slice(rows.start // reduce, -(-rows.stop // reduce))
+            small[to], small_rim[to] = _means(off, reduce), _means(rim.astype(np.float32), reduce)
+    if not small_rim.any():
+        return
+    small = carried(small, small_rim, spacing_px=spacing_px / reduce)
+    for rows in parts:
+        first, last = max(0, rows.start // reduce - 1), min(size[0], -(-rows.stop // reduce) + 1)
+        larger = (size[1] * reduce, (last - first) * reduce)
+        found = cv2.resize(small[first:last], larger, interpolation=cv2.INTER_LINEAR)
+        start = rows.start - first * reduce
+        yield (rows, every), np.asarray(found[start : start + rows.stop - rows.start, :width], np.float32)
+
+
+def _means(plane: Floats, reduce: int) -> Floats:
+    """The means of squares of `reduce` pixels a side; beyond the picture lies 0."""
+    more = [(0, -side % reduce) for side in plane.shape[:2]] + [(0, 0)] * (plane.ndim - 2)
+    whole = np.pad(plane, more)
+    size = (whole.shape[1] // reduce, whole.shape[0] // reduce)
+    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.float32)
