@@ -33,3 +33,12 @@ def within(window: Window, wider: Window) -> Window:
         for part, more in zip(window, wider, strict=True)
     )
     return rows, columns
+
+
+def clipped(window: Window, limits: Window) -> Window:
+    """The part of a window that lies in another."""
+    rows, columns = (
+        slice(max(part.start, end.start), min(part.stop, end.stop))
+        for part, end in zip(window, limits, strict=True)
+    )
+    return rows, columns

@@ -29,9 +29,9 @@ _SCALES = (0.5, 1.0, 2.0, 4.0)
 _COARSE_SIGMA = 16.0
 _LEAST_SIGMA = 4.0
 _FINEST_PX = 0.7
-# Parts of a picture that are carried into apart, and how far, in sigmas, a bell reaches.
-_PART_PX = 1024
+# A bell reaches so many sigmas; a picture is carried into in parts of twice that, or of so many pixels.
 _REACH = 4.0
+_PART_PX = 256
 
 
 def matched_light(
@@ -73,9 +73,13 @@ def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:
     for scale in _SCALES:
         sigma = max(_FINEST_PX, scale * _SMOOTH * spacing_px)
         for plane, summed in ((off, total), (rim, weight)):
-            summed += cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / scale
-    fading = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
-    return (total * fading[:, :, None]).astype(np.float32)
+            blurred = np.asarray(
+                cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT), np.float32
+            )
+            blurred /= scale
+            summed += blurred
+    total *= (np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9))[:, :, None]
+    return total
 
 
 def carried_into(
@@ -92,8 +96,9 @@ def carried_into(
         yield from _carried_coarsely(read, shape, 2 ** int(np.log2(finest / _LEAST_SIGMA)), spacing_px)
         return
     reach = int(np.ceil(_REACH * max(_FINEST_PX, _SCALES[-1] * _SMOOTH * spacing_px))) + 1
-    for rows in strips_of(height, _PART_PX):
-        for columns in strips_of(width, _PART_PX):
+    part = max(_PART_PX, 2 * reach)
+    for rows in strips_of(height, part):
+        for columns in strips_of(width, part):
             wider = wider_by((rows, columns), reach, shape)
             off, rim = read(wider)
             if rim.any():
@@ -112,7 +117,7 @@ def _carried_coarsely(
     size = -(-height // reduce), -(-width // reduce)
     small, small_rim = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
     every = slice(0, width)
-    parts = list(strips_of(height, max(reduce, _PART_PX // 4 // reduce * reduce)))
+    parts = list(strips_of(height, max(reduce, _PART_PX // reduce * reduce)))
     for rows in parts:
         off, rim = read((rows, every))
         if rim.any():

@@ -27,6 +27,8 @@ _WHOLE = 0.99
 # Grain is what is finer than this, in pixels, and it is given back until the mean is as sharp as this share
 # of the sources.
 _GRAIN_PX = 1.5
+GRAIN_REACH_PX = 8
+"""Grain is told from so many pixels around."""
 _QUANTILE = 0.25
 # So many pixels tell how sharp a window is.
 _ASKED = 40_000
@@ -41,11 +43,13 @@ def painted(
     corner: tuple[int, int],
     drawn: NDArray[np.uint8] | None,
     fading_px: float,
-) -> tuple[Floats, Floats]:
+    grain: float | None = None,
+) -> tuple[Floats, Floats, float]:
     """The colours [h, w, 3] of a window at `corner` (x, y) and how surely any source shows them [h, w], 0..1.
 
     Sharpness is that of the pixels `inside` [h, w]. Where a source's known ground ends it fades over
-    `fading_px`. With `drawn` [H, W] only ground of the pattern is shown.
+    `fading_px`. With `drawn` [H, W] only ground of the pattern is shown. Last how much of the best source's
+    grain was given back: what it takes, or as much as `grain` says.
     """
     height, width = inside.shape
     total, weight = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
@@ -69,9 +73,8 @@ def painted(
         weight += counts
         shown.append(_shown(source.misfit, colours, known, inside, best=shown))
     mean = (total / np.maximum(weight, 1e-9)[..., None]).astype(np.float32)
-    if len(shown) > 1:
-        _sharpen(mean, shown, inside)
-    return mean, weight
+    given = _sharpen(mean, shown, inside, grain) if len(shown) > 1 else 0.0
+    return mean, weight, given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,21 +98,24 @@ def _shown(misfit: float, colours: Floats, known: Floats, inside: Mask, *, best:
     return _Shown(misfit, _energy(colours, whole) / pixels, (colours, known) if leads else None)
 
 
-def _sharpen(mean: Floats, shown: list[_Shown], inside: Mask) -> None:
-    """Add the grain of the best source, as much as makes the mean as sharp as its sources."""
+def _sharpen(mean: Floats, shown: list[_Shown], inside: Mask, share: float | None) -> float:
+    """Add the grain of the best source, this share or as much as makes the mean as sharp as its sources."""
     leading = [one for one in shown if one.picture is not None]
     if not leading:
-        return
+        return 0.0
     lead, known = leading[-1].picture or (mean, inside)
     wanted = float(np.quantile([one.energy for one in shown if one.energy is not None], _QUANTILE))
     beyond = (lead - mean) * known[..., None]
     beyond -= cv2.GaussianBlur(beyond, (0, 0), _GRAIN_PX)
-    whole = inside & (known > _WHOLE)
-    count = max(int(whole.sum()), 1)
-    plain, square = _energy(mean, whole) / count, _energy(beyond, whole) / count
-    both = _energy(mean, whole, beyond) / count
-    if share := share_to_reach(wanted, plain, both, square):
-        mean += np.float32(min(1.0, share)) * beyond
+    if share is None:
+        whole = inside & (known > _WHOLE)
+        count = max(int(whole.sum()), 1)
+        plain, square = _energy(mean, whole) / count, _energy(beyond, whole) / count
+        both = _energy(mean, whole, beyond) / count
+        share = min(1.0, share_to_reach(wanted, plain, both, square))
+    if share:
+        mean += np.float32(share) * beyond
+    return share
 
 
 def share_to_reach(energy: float, plain: float, both: float, square: float) -> float:

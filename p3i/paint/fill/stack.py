@@ -14,6 +14,7 @@ Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W], True is to 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from p3i.paint.fill.ground import Ground
 from p3i.paint.fill.light import MOST_CARRIED, carried_into, rim_of
 from p3i.paint.fill.matching import trusted
-from p3i.paint.fill.mixing import feathered, painted
+from p3i.paint.fill.mixing import GRAIN_REACH_PX, feathered, painted
 from p3i.paint.fill.pieces import Labels, Piece, drawn_on, padded, pieces_of
 from p3i.paint.fill.scattered import Scattered, near_rims
 from p3i.paint.fill.sources import MOST_TRIED, Hole, Source, hole_of, shown_elsewhere, sources
@@ -31,7 +32,7 @@ from p3i.paint.fill.survey import Survey, survey_of
 from p3i.place.moves import nearest_px, pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.fill import fill_in
-from p3i.vision.strips import Window, strips_of, wider_by, within
+from p3i.vision.strips import Window, clipped, strips_of, wider_by, within
 from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
@@ -45,6 +46,8 @@ _RIM_PX = 4
 _READ_PX = 2
 # Cells go over into each other, and sources fade, within this share of the distance to the next object.
 _FADING = 0.08
+# So many pixels of a piece are painted at once, and so many such parts tell how much grain all of it needs.
+_MOST_PX, _ASKED = 2_000_000, 3
 # A pixel is shown where the weights of its sources come to this.
 _SHOWN = 1e-6
 
@@ -152,9 +155,12 @@ def _filled(
             plans.append(plan)
 
     def added() -> Iterator[tuple[Window, tuple[Floats, Floats]]]:
-        for done, plan in enumerate(sorted(plans, key=lambda one: one.window[0].start)):
-            told(len(plans) + done, len(plans))
-            yield plan.window, _painted(plan, labels, ground, hole)
+        grains = [_grain(plan, labels, ground, hole) for plan in plans]
+        parts = [(part, number) for number, plan in enumerate(plans) for part in _parts(plan)]
+        for done, (part, number) in enumerate(sorted(parts, key=lambda one: one[0][0].start)):
+            told(len(parts) + done, len(parts))
+            colours, share, _ = _painted(plans[number], part, labels, ground, hole, grains[number])
+            yield part, (colours, share)
 
     shown, edges = np.zeros_like(hole), list[Scattered]()
     for strip in summed(hole.shape, added()):
@@ -192,20 +198,45 @@ def _planned(
     return _Plan(piece, found, weighed(one, ground, found), allowed, window, radius)
 
 
-def _painted(plan: _Plan, labels: Labels, ground: Ground, hole: Mask) -> tuple[Floats, Floats]:
-    """A piece's colours [h, w, 3] in its window, and their weight [h, w]."""
+def _parts(plan: _Plan) -> list[Window]:
+    """The window of a plan in strips of no more pixels than are painted at once."""
     rows, columns = plan.window
-    own = labels[plan.window] == plan.piece.number
-    colours, sure = painted(
+    most = max(1, _MOST_PX // (columns.stop - columns.start))
+    count = -(-(rows.stop - rows.start) // most)
+    ends = np.linspace(rows.start, rows.stop, count + 1).astype(int).tolist()
+    return [(slice(*part), columns) for part in pairwise(ends)]
+
+
+def _grain(plan: _Plan, labels: Labels, ground: Ground, hole: Mask) -> float | None:
+    """How much grain a piece needs that is painted in parts, told by some of them; None for one part."""
+    parts = _parts(plan)
+    if len(parts) == 1:
+        return None
+    some = [parts[place] for place in np.linspace(0, len(parts) - 1, min(len(parts), _ASKED)).astype(int)]
+    return float(np.median([_painted(plan, part, labels, ground, hole)[2] for part in some]))
+
+
+def _painted(
+    plan: _Plan, part: Window, labels: Labels, ground: Ground, hole: Mask, grain: float | None = None
+) -> tuple[Floats, Floats, float]:
+    """A piece's colours [h, w, 3] in a part of its window, their weight [h, w], and how much grain it is."""
+    rows, columns = wider = clipped(
+        wider_by(part, max(GRAIN_REACH_PX, plan.fading_px), hole.shape), plan.window
+    )
+    own = labels[wider] == plan.piece.number
+    colours, sure, given = painted(
         ground,
         plan.found,
         plan.weights,
-        own & hole[plan.window],
+        own & hole[wider],
         corner=(columns.start, rows.start),
         drawn=plan.allowed,
         fading_px=plan.fading_px,
+        grain=grain,
     )
-    return colours, feathered(own, plan.fading_px) * (sure > _SHOWN)
+    inner = within(part, wider)
+    share = feathered(own, plan.fading_px) * (sure > _SHOWN)
+    return colours[inner], share[inner], given
 
 
 def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
