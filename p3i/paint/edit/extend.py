@@ -27,7 +27,7 @@ from p3i.options.extend import SIDES, Beyond, ExtendOptions
 from p3i.paint.edit.border import border_px, within
 from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
-from p3i.paint.fill.holes import marked, on_flat
+from p3i.paint.fill.holes import hidden_ground, on_flat
 from p3i.paint.fill.pieces import cells_on
 from p3i.paint.fill.stack import fill_in_place
 from p3i.place.continued import Continued, continued, widened
@@ -137,8 +137,7 @@ def extend(
     """
     asked: ExtendOptions = changed(options or ExtendOptions(), changes, verb="extend")
     notes = list[str]()
-    hidden = marked(photo, mask)
-    hole = hidden if asked.keep_transparent else hidden | ~photo.valid
+    hidden, hole = hidden_ground(photo, mask, keep_transparent=asked.keep_transparent)
     flat = flat_of(photo, program, focal_mm=asked.focal_mm)
     if flat.k1 is not None:
         notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
