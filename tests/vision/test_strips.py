@@ -13,11 +13,13 @@ from p3i.vision.strips import ROWS, clipped, strips_of, wider_by, within
 SIDES = st.integers(1, 40)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2000), st.integers(1, 700))
 def test_strips_hold_each_row_once(height: int, rows: int) -> None:
     assert [row for part in strips_of(height, rows) for row in range(height)[part]] == list(range(height))
 
 
+@settings(deadline=None)
 @given(SIDES, SIDES, st.integers(0, 9))
 def test_a_wider_window_holds_the_window(top: int, left: int, by_px: int) -> None:
     picture = np.arange(50 * 60).reshape(50, 60)
