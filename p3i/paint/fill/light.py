@@ -15,6 +15,9 @@ Floats = NDArray[np.float32]
 _GAINS = (0.5, 2.0)
 _PRIOR = 0.1
 _PRIOR_VARIANCE = 1e-3
+# What surroundings differ by is weighed anew so many times, and told no finer than this.
+_ROUNDS = 2
+_LEAST_OFF = 1 / 255
 MOST_CARRIED = 0.15
 """What a rim lacks is carried in up to this."""
 # What is carried in from a rim is smoothed along it over this share of the distance to the next object, times
@@ -36,18 +39,47 @@ def matched_light(
 ) -> tuple[Array, Array]:
     """The gain and offset [3] that bring colours [K, 3] closest to those wanted; 1 and 0 without weight.
 
-    Those of `light` count instead, as far as the colours have not all of the `share` (0..1).
+    Those of `light` count instead, as far as the colours have not all of the `share` (0..1). Robust (Huber
+    1964): places that differ by more than half of the rest do count the less, so that what is foreign
+    around a hole tells nothing of light.
     """
     before, lifted = light if light is not None else (np.ones(3), np.zeros(3))
+    gain, offset = _closest(colours, wanted, weights, before, lifted, share)
+    for _ in range(_ROUNDS if weights.any() else 0):
+        off = np.abs(gain * colours + offset - wanted).mean(1)
+        usual = max(_weighted_median(off, weights), _LEAST_OFF)
+        robust = weights * np.minimum(1, usual / np.maximum(off, _LEAST_OFF))
+        gain, offset = _closest(colours, wanted, robust, before, lifted, share)
+    return gain, offset
+
+
+def _closest(
+    colours: NDArray, wanted: NDArray, weights: NDArray, before: Array, lifted: Array, share: float
+) -> tuple[Array, Array]:
+    """The gain and offset [3] by one regression, drawn to the gain `before` and the offset `lifted`.
+
+    Both sides are told with errors: an object differs from its like by what is its own. Least squares would
+    make every source paler by that (attenuation; Fuller, Measurement Error Models, 1987, section 1.1), and
+    their mean a second time. With as much of it on both sides the reliability is their correlation.
+    """
     parts = (weights / max(float(weights.sum()), 1e-9))[:, None].astype(float)
     mean, wanted_mean = (parts * colours).sum(0), (parts * wanted).sum(0)
     variance = (parts * (colours - mean) ** 2).sum(0)
-    together = (parts * (colours - mean) * (wanted - wanted_mean)).sum(0)
+    spread = (parts * (wanted - wanted_mean) ** 2).sum(0)
+    together = np.maximum((parts * (colours - mean) * (wanted - wanted_mean)).sum(0), 0)
+    reliable = np.minimum(together / np.sqrt(np.maximum(variance * spread, 1e-12)), 1) * variance
     prior = _PRIOR * variance + _PRIOR_VARIANCE
     prior += (1 - share) / share * variance
-    gain = np.clip((together + before * prior) / (variance + prior), *_GAINS)
+    gain = np.clip((together + before * prior) / (reliable + prior), *_GAINS)
     level = share * wanted_mean + (1 - share) * (before * mean + lifted)
     return gain, level - gain * mean
+
+
+def _weighted_median(values: NDArray, weights: NDArray) -> float:
+    """The value [K] below which half of the weights [K] lie."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    return float(values[order[min(np.searchsorted(below, below[-1] / 2), len(order) - 1)]])
 
 
 def rim_of(hole: NDArray, known: NDArray, *, reach_px: float) -> NDArray[np.bool_]:

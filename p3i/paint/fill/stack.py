@@ -38,6 +38,8 @@ Progress = Callable[[str, float], None]
 _RIM_PX = 4
 # Cells go over into each other, and sources fade, within this share of the distance to the next object.
 _FADING = 0.08
+# Beyond its drawn ground the pattern goes on where it is off, around the hole, by this share of what else is.
+_GOES_ON = 0.6
 # A pixel is shown where the weights of its sources come to this.
 _SHOWN = 1e-6
 
@@ -123,9 +125,15 @@ def _fill(
         return
     allowed = 1 - drawn if piece.beyond else drawn
     found = sources(one, ground, placed, most=most, survey=survey, allowed=allowed)
+    weights = weighed(one, ground, found)
+    if piece.beyond:
+        # A program may end before its pattern does: what lies around decides.
+        either = sources(one, ground, placed, most=most, survey=survey)
+        either_weights = weighed(one, ground, either)
+        if _off(one, ground, either, either_weights) < _GOES_ON * _off(one, ground, found, weights):
+            found, weights, allowed = either, either_weights, None
     if not found:
         return
-    weights = weighed(one, ground, found)
     radius = max(1, round(_FADING * one.spacing_px))
     margin = radius + _RIM_PX + 1
     height, width = hole.shape
@@ -150,6 +158,8 @@ def _fill(
 def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
     misfits = np.array([source.misfit for source in found])
+    if not found:
+        return misfits
     if not hole.weights.any():
         return trusted(np.zeros((len(found), 0, 3)), hole.weights, misfits)
     residuals = []
@@ -159,6 +169,19 @@ def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
         shown = (front & ground.known(at))[:, None]
         residuals.append(np.where(shown, colours - hole.colours, 0))
     return trusted(np.stack(residuals), hole.weights, misfits, share=hole.share)
+
+
+def _off(hole: Hole, ground: Ground, found: list[Source], weights: Array) -> float:
+    """How much the mean of sources differs from what lies around a hole; inf where they show none of it."""
+    total, shown = np.zeros_like(hole.around, shape=hole.colours.shape), np.zeros(len(hole.around))
+    for source, weight in zip(found, weights, strict=True):
+        at, front = source.where(hole.around)
+        counts = weight * (front & ground.known(at))
+        total += counts[:, None] * (source.gain * taken(ground.pixels, at) + source.offset)
+        shown += counts
+    off = np.abs(total / np.maximum(shown, _SHOWN)[:, None] - hole.colours).mean(1)
+    told = hole.weights * (shown > _SHOWN)
+    return float((told * off).sum() / told.sum()) if told.any() else np.inf
 
 
 def _carry_rim(total: Floats, shown: Mask, pixels: Floats, sure: Floats, hole: Mask, placed: Placed) -> None:
