@@ -16,15 +16,15 @@ _GAINS = (0.5, 2.0)
 _PRIOR = 0.1
 _PRIOR_VARIANCE = 1e-3
 # What surroundings differ by is weighed anew so many times, and told no finer than this.
-_ROUNDS = 2
+_ROUNDS = 3
 _LEAST_OFF = 1 / 255
 MOST_CARRIED = 0.15
 """What a rim lacks is carried in up to this."""
 # What is carried in from a rim is smoothed along it over this share of the distance to the next object, times
-# each of these: near the rim its own difference counts, further in that of more.
+# each of these: at the rim its own difference counts, further in that of more.
 _SMOOTH = 0.125
-_SCALES = (0.5, 1.0, 2.0, 4.0)
-# Where the finest smoothing is over this many pixels the rim is reduced first, until it is over so many.
+_SCALES = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
+# Where a smoothing is over this many pixels the rim is reduced first, until it is over so many.
 _COARSE_SIGMA = 16.0
 _LEAST_SIGMA = 4.0
 
@@ -39,16 +39,16 @@ def matched_light(
 ) -> tuple[Array, Array]:
     """The gain and offset [3] that bring colours [K, 3] closest to those wanted; 1 and 0 without weight.
 
-    Those of `light` count instead, as far as the colours have not all of the `share` (0..1). Robust (Huber
-    1964): places that differ by more than half of the rest do count the less, so that what is foreign
-    around a hole tells nothing of light.
+    Those of `light` count instead, as far as the colours have not all of the `share` (0..1). Robust:
+    places that differ by more than half of all do count the less, by the square of how much more (an
+    M-estimator whose influence falls off), so that what is foreign around a hole tells nothing of light.
     """
     before, lifted = light if light is not None else (np.ones(3), np.zeros(3))
     gain, offset = _closest(colours, wanted, weights, before, lifted, share)
     for _ in range(_ROUNDS if weights.any() else 0):
         off = np.abs(gain * colours + offset - wanted).mean(1)
         usual = max(_weighted_median(off, weights), _LEAST_OFF)
-        robust = weights * np.minimum(1, usual / np.maximum(off, _LEAST_OFF))
+        robust = weights * np.minimum(1, usual / np.maximum(off, _LEAST_OFF)) ** 2
         gain, offset = _closest(colours, wanted, robust, before, lifted, share)
     return gain, offset
 
@@ -94,21 +94,17 @@ def carried(off: Floats, rim: Floats, *, spacing_px: float) -> Floats:
     `rim` [h, w] is 1 on the rim, else 0; `spacing_px` is how far the next object lies. 0 without a rim.
     """
     height, width = rim.shape
-    finest = _SCALES[0] * _SMOOTH * spacing_px
-    if finest >= _COARSE_SIGMA:
-        # What is smooth over so many pixels is known from a reduced picture as well.
-        reduce = 2 ** int(np.log2(finest / _LEAST_SIGMA))
-        size = (-(-width // reduce), -(-height // reduce))
-        small, small_rim = (
-            np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.float32)
-            for plane in (off, rim)
-        )
-        found = carried(small, small_rim, spacing_px=spacing_px / reduce)
-        return np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
     total, weight = np.zeros_like(off), np.zeros_like(rim)
     for scale in _SCALES:
         sigma = max(0.7, scale * _SMOOTH * spacing_px)
+        # What is smooth over so many pixels is known from a reduced picture as well.
+        reduce = 2 ** int(np.log2(sigma / _LEAST_SIGMA)) if sigma >= _COARSE_SIGMA else 1
+        size = (-(-width // reduce), -(-height // reduce))
         for plane, summed in ((off, total), (rim, weight)):
-            summed += cv2.GaussianBlur(plane, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT) / scale
+            small = plane if reduce == 1 else cv2.resize(plane, size, interpolation=cv2.INTER_AREA)
+            blurred = cv2.GaussianBlur(small, (0, 0), sigma / reduce, borderType=cv2.BORDER_CONSTANT)
+            if reduce > 1:
+                blurred = cv2.resize(blurred, (width, height), interpolation=cv2.INTER_LINEAR)
+            summed += blurred / np.float32(scale)
     fading = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
     return (total * fading[:, :, None]).astype(np.float32)

@@ -8,7 +8,6 @@ it is added that it is as sharp.
 Convention: a window of the photo, [h, w] pixels; colours float32 RGB.
 """
 
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
