@@ -1,4 +1,4 @@
-"""The light of a source: told by what is alike around a hole, not by what is foreign, nor paler by what differs."""
+"""The light of a source: told by what is alike around a hole, not by what is foreign, nor paler for it."""
 
 import numpy as np
 from hypothesis import given, settings
