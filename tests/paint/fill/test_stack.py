@@ -83,21 +83,6 @@ def test_two_colours_stay_two_colours() -> None:
         assert np.abs((result - photo.pixels)[part].mean(0)).max() * 255 < 4
 
 
-def test_a_pattern_that_its_program_ends_too_early_goes_on() -> None:
-    """A program that stops two columns short: what lies beyond it comes back as the pattern it is."""
-    photo = drawn(DENSE)
-    short = DENSE.replace("(-6, 7)", "(-6, 4)")
-    laid = placed(loads(short), photo)
-    at = placed(loads(DENSE), photo)
-    one = at.centers_px()[0][(at.index == [4, 0]).all(1)][0]
-    hole = np.zeros(photo.valid.shape, bool)
-    left, top = np.rint(one - 12).astype(int)
-    hole[top : top + 25, left : left + 25] = True
-    assert (drawn_on(laid)[hole] == 0).mean() > 0.5
-    result, _ = fill_by_stack(hidden(photo, hole), photo.valid, hole, laid)
-    assert np.abs(result - photo.pixels)[hole].mean() * 255 < 4
-
-
 def test_grain_is_given_back() -> None:
     """A mean of twelve sources keeps a twelfth of the grain's energy."""
     photo = drawn(DENSE)
