@@ -48,6 +48,8 @@ _READ_PX = 2
 _FADING = 0.08
 # So many pixels of a piece are painted at once, and so many such parts tell how much grain all of it needs.
 _MOST_PX, _ASKED = 2_000_000, 3
+# Beyond its drawn ground the pattern goes on where it is off, around the hole, by this share of what else is.
+_GOES_ON = 0.6
 # A pixel is shown where the weights of its sources come to this.
 _SHOWN = 1e-6
 
@@ -118,14 +120,14 @@ def _points(piece: Piece, labels: Labels, hole: Mask) -> Array:
 class _Plan:
     """A piece, the sources that it is filled from and how much each counts, [S].
 
-    They show what lies on `allowed` ground [H, W] and fade over `fading_px`; the piece's `window` holds as
-    much around it.
+    They show what lies on `allowed` ground [H, W], None is all, and fade over `fading_px`; the piece's
+    `window` holds as much around it.
     """
 
     piece: Piece
     found: list[Source]
     weights: Array
-    allowed: NDArray[np.uint8]
+    allowed: NDArray[np.uint8] | None
     window: Window
     fading_px: int
 
@@ -180,7 +182,7 @@ def _planned(
     piece: Piece,
     one: Hole,
     ground: Ground,
-    allowed: NDArray[np.uint8],
+    allowed: NDArray[np.uint8] | None,
     placed: Placed,
     survey: Survey | None,
     *,
@@ -190,12 +192,19 @@ def _planned(
     if piece.beyond and not one.weights.any():
         return None
     found = sources(one, ground, placed, most=most, survey=survey, allowed=allowed)
+    weights = weighed(one, ground, found)
+    if piece.beyond:
+        # A program may end before its pattern does: what lies around decides.
+        either = sources(one, ground, placed, most=most, survey=survey)
+        either_weights = weighed(one, ground, either)
+        if _off(one, ground, either, either_weights) < _GOES_ON * _off(one, ground, found, weights):
+            found, weights, allowed = either, either_weights, None
     if not found:
         return None
     radius = max(1, round(_FADING * one.spacing_px))
     left, top, right, bottom = piece.box
-    window = wider_by((slice(top, bottom), slice(left, right)), radius + _RIM_PX + 1, allowed.shape)
-    return _Plan(piece, found, weighed(one, ground, found), allowed, window, radius)
+    window = wider_by((slice(top, bottom), slice(left, right)), radius + _RIM_PX + 1, ground.sure.shape)
+    return _Plan(piece, found, weights, allowed, window, radius)
 
 
 def _parts(plan: _Plan) -> list[Window]:
@@ -242,6 +251,8 @@ def _painted(
 def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
     misfits = np.array([source.misfit for source in found])
+    if not found:
+        return misfits
     if not hole.weights.any():
         return trusted(np.zeros((len(found), 0, 3)), hole.weights, misfits)
     residuals = []
@@ -251,6 +262,19 @@ def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
         shown = (front & ground.known(at))[:, None]
         residuals.append(np.where(shown, colours - hole.colours, 0))
     return trusted(np.stack(residuals), hole.weights, misfits, share=hole.share)
+
+
+def _off(hole: Hole, ground: Ground, found: list[Source], weights: Array) -> float:
+    """How much the mean of sources differs from what lies around a hole; inf where they show none of it."""
+    total, shown = np.zeros_like(hole.around, shape=hole.colours.shape), np.zeros(len(hole.around))
+    for source, weight in zip(found, weights, strict=True):
+        at, front = source.where(hole.around)
+        counts = weight * (front & ground.known(at))
+        total += counts[:, None] * (source.gain * taken(ground.pixels, at) + source.offset)
+        shown += counts
+    off = np.abs(total / np.maximum(shown, _SHOWN)[:, None] - hole.colours).mean(1)
+    told = hole.weights * (shown > _SHOWN)
+    return float((told * off).sum() / told.sum()) if told.any() else np.inf
 
 
 def _carry_rim(pixels: Floats, rim: Scattered, hole: Mask, placed: Placed) -> None:
