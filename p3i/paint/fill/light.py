@@ -122,7 +122,9 @@ def carried_into(
                 summed += _smoothed(told, sigma)[inner] / np.float32(scale)
         weight = summed[:, :, 3:]
         if weight.any():
-            yield window, summed[:, :, :3] * (np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9))
+            lift = summed[:, :, :3]
+            lift *= np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
+            yield window, lift
 
 
 @dataclass(frozen=True, slots=True, eq=False)
