@@ -18,12 +18,19 @@ def filled(array: np.ndarray, valid: np.ndarray) -> np.ndarray:
 
 
 def fill_in(array: np.ndarray, valid: np.ndarray, where: np.ndarray) -> None:
-    """Write `filled` into the array's pixels `where` bool [H, W], in place.
+    """Write `filled` into the array's pixels `where` bool [H, W] that are not valid, in place.
 
-    Channel by channel: all at once takes as much memory as a large picture's other copies together.
+    Channel by channel, and no more than what is needed of each level: a large picture's copies are much.
     """
-    for channel in np.split(array, array.shape[2], axis=2):
-        np.copyto(channel, filled(channel, valid), where=where[:, :, None])
+    height, width = valid.shape
+    half = _half(width, height)
+    weight = cv2.resize(valid.astype(np.float32), half, interpolation=cv2.INTER_AREA).reshape(half[::-1])
+    for channel in range(array.shape[2]):
+        plane = array[:, :, channel]
+        known = cv2.resize(np.where(valid, plane, np.float32(0)), half, interpolation=cv2.INTER_AREA)
+        coarse = _push_pull(known.reshape(half[1], half[0], -1), weight)
+        coarse = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+        np.copyto(plane, coarse.reshape(height, width), where=where & ~valid)
 
 
 def eroded(valid: np.ndarray, radius: int) -> np.ndarray:
@@ -41,7 +48,7 @@ def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     height, width = weight.shape
     if weight.min() >= 1 or max(height, width) == 1:
         return value
-    half = (max(1, (width + 1) // 2), max(1, (height + 1) // 2))
+    half = _half(width, height)
     smaller = cv2.resize(weighted, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], -1)
     smaller_weight = cv2.resize(weight, half, interpolation=cv2.INTER_AREA)
     coarse = cv2.resize(_push_pull(smaller, smaller_weight), (width, height), interpolation=cv2.INTER_LINEAR)
@@ -52,3 +59,7 @@ def _push_pull(weighted: np.ndarray, weight: np.ndarray) -> np.ndarray:
     value += coarse
     np.copyto(value, weighted, where=weight[:, :, None] >= 1)
     return value
+
+
+def _half(width: int, height: int) -> tuple[int, int]:
+    return max(1, (width + 1) // 2), max(1, (height + 1) // 2)

@@ -12,6 +12,7 @@ from p3i.size import Size
 from p3i.vision.exif import reframed_exif
 from p3i.vision.image import Image
 from p3i.vision.picture_kinds import PICTURE_KINDS, picture_kind
+from p3i.vision.strips import strips_of
 from p3i.vision.tiff import has_tifffile
 from p3i.vision.write import encode
 
@@ -99,8 +100,11 @@ def repainted(photo: Image, pixels: np.ndarray, *, alpha: np.ndarray | None) -> 
     kind = np.uint8 if top == 255 else np.uint16
     if alpha is not None and (alpha == 1).all():
         alpha = None
+    values = np.empty(pixels.shape, kind)
+    for rows in strips_of(len(pixels)):
+        values[rows] = np.rint(pixels[rows].clip(0, 1) * top)
     return Picture(
-        np.rint(pixels.clip(0, 1) * top).astype(kind),
+        values,
         None if alpha is None else np.rint(alpha * top).astype(kind),
         photo.source.icc,
         photo.source.exif,

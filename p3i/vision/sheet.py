@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.vision.strips import strips_of
 from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 _PROBES = 96  # probe points along the longer side of the photo, for the box of visible cells
+_REACH = 2  # pixels that the bell which halves a picture reaches
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,18 +166,50 @@ def sampled(
     level = np.clip(np.round(np.log2(np.maximum(spacing, 1e-6)) + 0.2), 0, 5).astype(int)
     places = np.where(inside[..., None], at, 0).astype(np.float32)
     values = np.zeros((*inside.shape, 3), np.float32)
-    weight = valid.astype(np.float32)
-    colour = np.ascontiguousarray(pixels * weight[..., None], dtype=np.float32)
     seen = np.zeros(inside.shape, bool)
+    colour, weight = np.zeros((0, 0, 3), np.float32), np.zeros((0, 0), np.float32)
     for k in range(int(level[inside].max(initial=0)) + 1):
-        if k:
+        if k == 1:
+            colour, weight = _halved(pixels, valid)
+        elif k:
             colour, weight = cv2.pyrDown(colour), cv2.pyrDown(weight)
         here = inside & (level == k)
         if not here.any():
             continue
         points = places[here] / 2**k
-        known = taken(weight, points)
-        values[here] = taken(colour, points) / np.maximum(known, 1e-3)[:, None]
+        found, known = (taken(colour, points), taken(weight, points)) if k else _read(pixels, valid, points)
+        values[here] = found / np.maximum(known, 1e-3)[:, None]
         seen[here] = known > 0.6
     values[~seen] = 0
     return Sheet(np.ascontiguousarray(values.transpose(2, 0, 1)), seen, box, side)
+
+
+def _known(pixels: Floats, valid: Mask, rows: slice) -> tuple[Floats, Floats]:
+    """Some rows of a photo with what is unknown at 0, and 1 where it is known: [h, W, 3], [h, W]."""
+    weight = valid[rows].astype(np.float32)
+    return pixels[rows] * weight[..., None], weight
+
+
+def _read(pixels: Floats, valid: Mask, points: NDArray) -> tuple[Floats, Floats]:
+    """What is known of a photo at points [K, 2], [K, 3], and how far that is [K], strip by strip."""
+    found, known = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
+    for rows in strips_of(len(pixels)):
+        here = np.flatnonzero((points[:, 1] >= rows.start) & (points[:, 1] < rows.stop))
+        if len(here):
+            colour, weight = _known(pixels, valid, slice(rows.start, rows.stop + 1))
+            at = points[here] - np.array([0, rows.start], np.float32)
+            found[here], known[here] = taken(colour, at), taken(weight, at)
+    return found, known
+
+
+def _halved(pixels: Floats, valid: Mask) -> tuple[Floats, Floats]:
+    """What is known of a photo, and how far it is, half as large, made strip by strip: [h, w, 3], [h, w]."""
+    height, width = valid.shape
+    size = (height + 1) // 2, (width + 1) // 2
+    halves = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
+    for rows in strips_of(height):
+        top = max(0, rows.start - 2 * _REACH)  # even, so that halves stand where they did
+        for half, part in zip(halves, _known(pixels, valid, slice(top, rows.stop + 2 * _REACH)), strict=True):
+            to = slice(rows.start // 2, (rows.stop + 1) // 2)
+            half[to] = cv2.pyrDown(part)[to.start - top // 2 : to.stop - top // 2]
+    return halves

@@ -16,7 +16,7 @@ from p3i.paint.fill.pieces import cells_on
 from p3i.paint.fill.stack import fill_by_stack
 from p3i.place.placed import Placed
 from p3i.size import Size
-from p3i.vision.image import Image, resized
+from p3i.vision.image import Image, resized, resized_from_photo
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32]
@@ -37,9 +37,8 @@ def border_px(photo: Image, laid: Placed) -> Sides:
     """How wide a border is painted on each side of a straight photo, 0 where none is or none can be told."""
     small = resized(photo, _LONGER)
     scale = photo.size.longer / small.size.longer
-    shift = (1 / scale - 1) / 2
-    shrunk = np.array([[1 / scale, 0, shift], [0, 1 / scale, shift], [0, 0, 1.0]])
-    laid = dataclasses.replace(laid, size=small.size, image_from_plane=shrunk @ laid.image_from_plane)
+    shrunk = resized_from_photo(1 / scale) @ laid.image_from_plane
+    laid = dataclasses.replace(laid, size=small.size, image_from_plane=shrunk)
     width, height = small.size.width, small.size.height
     deep = max(2, round(_WIDEST * min(width, height)))
     rim = np.ones((height, width), bool)

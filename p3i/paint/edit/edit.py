@@ -25,7 +25,7 @@ from p3i.paint.fill.cleared import cleared, covered, hanging, local_points, obje
 from p3i.paint.fill.completed import Completed, completed
 from p3i.paint.fill.cutout import Cutout, cutout, doubts
 from p3i.paint.fill.filled import share_text
-from p3i.paint.fill.holes import marked, on_flat
+from p3i.paint.fill.holes import hidden_ground, on_flat
 from p3i.paint.fill.sampled import Levels
 from p3i.place.continued import followed
 from p3i.place.flat import flat_of
@@ -119,8 +119,7 @@ def edit(
     no object of `old` is on the photo; for the mask as `inpaint` does.
     """
     asked: EditOptions = changed(options or EditOptions(), changes, verb="edit")
-    hidden = marked(photo, mask)
-    hole = hidden if asked.keep_transparent else hidden | ~photo.valid
+    hidden, hole = hidden_ground(photo, mask, keep_transparent=asked.keep_transparent)
     flat = flat_of(photo, old, focal_mm=asked.focal_mm)
     if not flat.placed.in_sight().any():
         raise UsageError("no object of the old program lies on the photo: there is nothing to copy")
@@ -144,7 +143,7 @@ def edit(
         said.append(f"for {part} the program has nothing like it: " + _what_of(bare, hidden))
     return Edited(
         photo,
-        np.where(touched[:, :, None], pixels, photo.pixels).astype(np.float32),
+        np.where(touched[:, :, None], pixels, photo.pixels),
         touched,
         *counts,
         filled=filled,

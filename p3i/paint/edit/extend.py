@@ -27,9 +27,9 @@ from p3i.options.extend import SIDES, Beyond, ExtendOptions
 from p3i.paint.edit.border import border_px, within
 from p3i.paint.edit.margins import Sides, before_horizon, grown, kept_sides, margins_px, refuse_horizon
 from p3i.paint.fill.cutout import cutout
-from p3i.paint.fill.holes import marked, on_flat
+from p3i.paint.fill.holes import hidden_ground, on_flat
 from p3i.paint.fill.pieces import cells_on
-from p3i.paint.fill.stack import fill_by_stack
+from p3i.paint.fill.stack import fill_in_place
 from p3i.place.continued import Continued, continued, widened
 from p3i.place.flat import Flat, flat_of
 from p3i.place.outlines import chart_of, polygons
@@ -137,8 +137,7 @@ def extend(
     """
     asked: ExtendOptions = changed(options or ExtendOptions(), changes, verb="extend")
     notes = list[str]()
-    hidden = marked(photo, mask)
-    hole = hidden if asked.keep_transparent else hidden | ~photo.valid
+    hidden, hole = hidden_ground(photo, mask, keep_transparent=asked.keep_transparent)
     flat = flat_of(photo, program, focal_mm=asked.focal_mm)
     if flat.k1 is not None:
         notes.append("the photo is straightened first, as its lens bends it: its own pixels are resampled")
@@ -159,13 +158,16 @@ def extend(
     wide = more.joined(laid).on_canvas(sides[:2], size)
 
     pixels, known, shown = _laid_out(flat, ~unknown, sides, size)
+    del unknown, hole  # a large picture's masks are much
     ground = _ground(wide)
     of_pattern = known & ground
     if flat.k1 is None and any(border := border_px(flat.photo, flat.placed)):
         of_pattern[_window(sides, photo.size)] &= within(photo.size, border)
         notes.append(_border_note(border))
-    pixels, bare = _painted(pixels, of_pattern, ~shown & ground, wide, progress)
-    bare |= ~shown & ~ground
+    ground &= ~shown
+    bare = _painted(pixels, of_pattern, ground, wide, progress)
+    bare |= ~(shown | ground)
+    del of_pattern, ground
     # What was transparent stays so where the pattern does not go on.
     inside, corner = _window(sides, flat.size), _window(flat.corner, flat.size)
     clear = bare[inside] & ~(flat.photo.valid | on_flat(flat, hidden))[corner] & flat.seen[corner]
@@ -205,21 +207,17 @@ def extend(
     return Extended(photo, pixels, alpha, kept, wide, len(more.index), smooth, filled, wider, tuple(notes))
 
 
-def _painted(
-    pixels: Floats, known: Mask, hole: Mask, wide: Placed, progress: Progress | None
-) -> tuple[Floats, Mask]:
-    """The hole filled from what is known of the pattern, and where nothing is like it [H, W]."""
+def _painted(pixels: Floats, known: Mask, hole: Mask, wide: Placed, progress: Progress | None) -> Mask:
+    """Fill the hole from what is known of the pattern, in place, and say where nothing is like it [H, W]."""
     left_over = hole
     for _ in range(_ROUNDS):
         if not left_over.any():
             break
-        pixels, unlike = fill_by_stack(
-            pixels, known | (hole & ~left_over), left_over, wide, most_tried=_MOST_TRIED, progress=progress
-        )
+        unlike = fill_in_place(pixels, known, left_over, wide, most_tried=_MOST_TRIED, progress=progress)
         if unlike.sum() == left_over.sum():
             break
-        left_over = unlike
-    return pixels, left_over
+        known, left_over = known | (left_over & ~unlike), unlike
+    return left_over
 
 
 def _on_canvas(more: Continued, laid: Placed, sides: Sides) -> Continued:
@@ -243,7 +241,7 @@ def _laid_out(flat: Flat, seen: Mask, sides: Sides, size: Size) -> tuple[Floats,
     beyond its old frame counts where it is known.
     """
     pixels = np.zeros((size.height, size.width, 3), np.float32)
-    known, shown = np.zeros((2, size.height, size.width), bool)
+    known, shown = (np.zeros(pixels.shape[:2], bool) for _ in range(2))
     left, top = sides[0] - flat.corner[0], sides[1] - flat.corner[1]
     into, out_of = [], []
     for start, length, limit in (
@@ -257,7 +255,8 @@ def _laid_out(flat: Flat, seen: Mask, sides: Sides, size: Size) -> tuple[Floats,
     known[to] = flat.photo.valid[of]
     shown[to] = seen[of] & flat.photo.valid[of]
     shown[_window(sides, flat.size)] = seen[_window(flat.corner, flat.size)]
-    return pixels, known & shown, shown
+    known &= shown
+    return pixels, known, shown
 
 
 def _alpha(photo: Image | None, known: Mask, shown: Mask, sides: Sides) -> Floats | None:

@@ -10,22 +10,24 @@ Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool or float32 [H, W].
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.cutout import Cutout
+from p3i.paint.fill.even import Even
 from p3i.paint.fill.grain import Grain
-from p3i.paint.fill.light import carried, rim_of
+from p3i.paint.fill.light import carried_into, rim_of
 from p3i.paint.fill.pieces import padded
 from p3i.place.moves import frames, nearest_px, pitch_px
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
 from p3i.size import Size
-from p3i.vision.fill import eroded, filled
+from p3i.vision.fill import eroded
 from p3i.vision.sheet import project
+from p3i.vision.strips import Window
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -46,8 +48,6 @@ _MOST_MOVES = 16
 _WHOLLY = 0.98
 # Texture is taken so far from objects at least, in distances: edges are blurred, and objects slip.
 _AWAY = 0.02
-# Light that is smooth over at least twice as many pixels is computed on a reduced picture.
-_FINEST_SIGMA = 4.0
 # What differs from the ground beside an object and touches it hangs on it, so far from its outline, in
 # distances: as the outline of an object that is shifted or larger does.
 _HANGS_ON = 0.08
@@ -59,13 +59,9 @@ _SAMPLE_PX = 1536
 _STRIP = 512
 # A cell's ground reaches this far beyond its border, in distances, where no other cell has it.
 _BEYOND = 0.05
-# The ground's light is told where this share of what is around is ground.
-_LEAST_SPREAD = 0.05
 
 
-def windows(
-    placed: Placed, layer: Floats, step: float, *, scale: float = 1.0
-) -> list[tuple[slice, slice] | None]:
+def windows(placed: Placed, layer: Floats, step: float, *, scale: float = 1.0) -> list[Window | None]:
     """Where a cell's `layer` [side, side(, C)] of each object may reach on the photo, rows and columns.
 
     Where its last channel is above 0; `step` is the grid's. None for objects out of sight.
@@ -78,7 +74,7 @@ def windows(
         for end, one in ((np.min, -1), (np.max, 1))
     )
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1]), (0, 0)])
-    found: list[tuple[slice, slice] | None] = []
+    found: list[Window | None] = []
     for frame in frames(placed):
         pixels, front = project(placed.image_from_plane, corners @ frame[:2, :2].T + frame[:2, 2])
         low = np.maximum(np.floor(pixels.min(0)), 0).astype(int)
@@ -89,7 +85,7 @@ def windows(
     return found
 
 
-def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> Array:
+def local_points(placed: Placed, frame: Array, window: Window) -> Array:
     """Where the pixels of a window lie about an object, in program units: [K, 2], row by row."""
     rows, columns = np.mgrid[window]
     pixels = np.stack([columns.ravel(), rows.ravel()], 1).astype(float)
@@ -97,7 +93,7 @@ def local_points(placed: Placed, frame: Array, window: tuple[slice, slice]) -> A
     return (points - frame[:2, 2]) @ frame[:2, :2]
 
 
-def object_masks(placed: Placed, layer: Floats, step: float) -> Iterator[tuple[tuple[slice, slice], Floats]]:
+def object_masks(placed: Placed, layer: Floats, step: float) -> Iterator[tuple[Window, Floats]]:
     """For each object in sight its window, and a `layer` of its cell's grid as it is seen: [h, w(, C)].
 
     `step` is the grid's, in program units.
@@ -152,28 +148,41 @@ def _clear(pixels: Floats, valid: Mask, placed: Placed, cut: Cutout, every: Mask
         return np.zeros_like(wanted)
     pitch_here = _pitch_px(placed)
     sigma = max(1.0, _BLUR * pitch_here)
-    wide, fine = _Even.of(ground, sigma=4 * sigma), _Even.of(ground, sigma=sigma)
+    wide, fine = Even.of(ground, sigma=4 * sigma), Even.of(ground, sigma=sigma)
     # Channel by channel, and in place: a large photo's copies are much.
+    size, evens = np.zeros(ground.shape, np.float32), list[Floats]()
     for channel in range(3):
-        here, there = wide.smooth(pixels[:, :, channel]), wide.smooth(expected[:, :, channel])
-        expected[:, :, channel] *= np.clip((here + 0.02) / (there + 0.02), *_GAINS)
-    detail = np.empty_like(expected)
-    for channel in range(3):
-        off = pixels[:, :, channel] - expected[:, :, channel]
-        np.subtract(off, fine.smooth(off), out=detail[:, :, channel])
-    typical = _typical(detail, ground)
+        plane = expected[:, :, channel]
+        gain = wide.smooth(pixels[:, :, channel])
+        gain += 0.02
+        gain /= wide.smooth(plane) + 0.02
+        plane *= np.clip(gain, *_GAINS, out=gain)
+        off = pixels[:, :, channel] - plane
+        evens.append(fine.reduced(off))
+        off -= fine.enlarged(evens[-1])
+        np.maximum(size, np.abs(off, out=off), out=size)
+    typical = _typical(size, ground)
+    del size
     beside = cv2.dilate(wanted.astype(np.uint8), _disc(_HANGS_ON * pitch_here)) > 0
     gone = wanted | hanging(ground & ~typical & beside, wanted)
     for rows, columns, inside, spacing in _holes(gone, placed):
+        here, there = pixels[rows, columns], expected[rows, columns]
         # What its own rim shows, but for other things there, if there is more than them.
         for beside in (typical, ground & ~gone, valid & ~every & ~gone):
             rim = rim_of(inside, beside[rows, columns], reach_px=_RIM_PX)
             if rim.any():
                 break
-        off = (pixels[rows, columns] - expected[rows, columns]) * rim[:, :, None]
-        lacking = carried(off, rim.astype(np.float32), spacing_px=spacing)
-        np.copyto(pixels[rows, columns], expected[rows, columns] + lacking, where=(inside > 0)[:, :, None])
-    del expected
+        read = partial(_lacking, here, there, rim)
+        filled_in = there.copy()
+        for window, lacking in carried_into(read, rim.shape, spacing_px=spacing):
+            filled_in[window] += lacking
+        np.copyto(here, filled_in, where=(inside > 0)[:, :, None])
+    # What is expected is needed no more: what the ground has beside its smooth part takes its place.
+    detail = expected
+    for channel, even in enumerate(evens):
+        plane = detail[:, :, channel]
+        np.subtract(pixels[:, :, channel], plane, out=plane)
+        plane -= fine.enlarged(even)
     inner = eroded(typical & ~gone, max(1, round(_AWAY * pitch_here)))
     inner = inner if inner.any() else typical
     moves = [_move(placed, each) for each in _steps_to_ground(placed, cut)]
@@ -196,7 +205,7 @@ def _clear(pixels: Floats, valid: Mask, placed: Placed, cut: Cutout, every: Mask
     return gone
 
 
-def _apart(wanted: Mask, placed: Placed) -> list[tuple[tuple[slice, slice], Mask]]:
+def _apart(wanted: Mask, placed: Placed) -> list[tuple[Window, Mask]]:
     """What of a mask [H, W] can be told and filled apart: rows and columns, and the part in these.
 
     About each part lie two cells, from which it is told and filled.
@@ -217,7 +226,7 @@ def _apart(wanted: Mask, placed: Placed) -> list[tuple[tuple[slice, slice], Mask
     return found
 
 
-def _cropped(placed: Placed, window: tuple[slice, slice]) -> Placed:
+def _cropped(placed: Placed, window: Window) -> Placed:
     """The program on a part of its photo."""
     rows, columns = window
     size = Size(columns.stop - columns.start, rows.stop - rows.start)
@@ -237,7 +246,7 @@ def _disc(radius: float) -> NDArray[np.uint8]:
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
 
-def _fullest(inner: Mask) -> tuple[slice, slice]:
+def _fullest(inner: Mask) -> Window:
     """The part of a mask, no larger than the grain of a texture needs, that holds most of it."""
     rows, columns = (range(0, side, _SAMPLE_PX) for side in inner.shape)
     parts = [(slice(y, y + _SAMPLE_PX), slice(x, x + _SAMPLE_PX)) for y in rows for x in columns]
@@ -258,43 +267,6 @@ def _expected(placed: Placed, cut: Cutout) -> tuple[Floats, Mask]:
     return shown, deepest > 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Even:
-    """How a ground [H, W] is made smooth over `sigma` pixels of a picture that is `reduce` times smaller.
-
-    What is that smooth is known from a reduced picture as well. `spread` is how much of what is around a
-    place of that is ground.
-    """
-
-    ground: Mask
-    reduce: int
-    sigma: float
-    spread: Floats
-
-    @classmethod
-    def of(cls, ground: Mask, *, sigma: float) -> "_Even":
-        reduce = 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
-        weight = _reduced(ground.astype(np.float32), reduce)
-        sigma = sigma * weight.shape[1] / ground.shape[1]
-        return cls(ground, reduce, sigma, np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma), np.float32))
-
-    def smooth(self, values: Floats) -> Floats:
-        """The ground's values [H, W] made smooth, and those of the nearest where it is none."""
-        known = _reduced(np.where(self.ground, values, np.float32(0)), self.reduce)
-        even = cv2.GaussianBlur(known, (0, 0), self.sigma) / np.maximum(self.spread, 1e-4)
-        even = filled(np.asarray(even, np.float32)[:, :, None], self.spread > _LEAST_SPREAD)[:, :, 0]
-        if self.reduce > 1:
-            even = cv2.resize(even, values.shape[::-1], interpolation=cv2.INTER_LINEAR)
-        return np.asarray(even, np.float32)
-
-
-def _reduced(values: Floats, reduce: int) -> Floats:
-    if reduce == 1:
-        return values
-    size = tuple(max(1, -(-side // reduce)) for side in values.shape[::-1])
-    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA), np.float32)
-
-
 def _holes(wanted: Mask, placed: Placed) -> Iterator[tuple[slice, slice, NDArray[np.uint8], float]]:
     """What hangs together of the mask: window, mask in it, and how far the next object lies, in pixels."""
     labels, stats, middles = cv2.connectedComponentsWithStats(wanted.astype(np.uint8), connectivity=4)[1:]
@@ -305,13 +277,16 @@ def _holes(wanted: Mask, placed: Placed) -> Iterator[tuple[slice, slice, NDArray
         yield rows, columns, (labels[rows, columns] == label).astype(np.uint8), spacing
 
 
-def _typical(detail: Floats, ground: Mask) -> Mask:
-    """Where `detail` [H, W, 3] is texture of the ground, not another thing that lies on it: [H, W]."""
-    size = np.abs(detail[:, :, 0])
-    for channel in (1, 2):
-        np.maximum(size, np.abs(detail[:, :, channel]), out=size)
+def _lacking(here: Floats, there: Floats, rim: Mask, window: Window) -> tuple[Floats, Mask]:
+    """What a photo `here` [h, w, 3] differs by from what is expected `there` at a rim [h, w], in a window."""
+    return (here[window] - there[window]) * rim[window][:, :, None], rim[window]
+
+
+def _typical(size: Floats, ground: Mask) -> Mask:
+    """Where detail of a `size` [H, W] is texture of the ground, not another thing that lies on it: [H, W]."""
     # The median of the absolute deviation, as one of a normal distribution.
-    limit = _MOST_DEVIATIONS * 1.4826 * float(np.median(size[ground])) + 1 / 255
+    middle = float(np.median(size[ground], overwrite_input=True))
+    limit = _MOST_DEVIATIONS * 1.4826 * middle + 1 / 255
     other = cv2.dilate(((size > limit) & ground).astype(np.uint8), np.ones((3, 3), np.uint8))
     return ground & (other == 0)
 

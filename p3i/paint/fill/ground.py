@@ -21,26 +21,27 @@ DEEPEST_PX = 32.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """A photo with its hole as a place to take colours from: `pixels` [H, W, 3], `sure` float [H, W].
+    """A photo with its hole as a place to take colours from: `pixels` [H, W, 3], `sure` uint8 [H, W].
 
-    `inwards` [H, W] is how many pixels each lies inside what is sure, at most `DEEPEST_PX`.
+    `sure` is 255 where all neighbours are known too, else 0; `inwards` [H, W] is how many pixels each lies
+    inside that, at most `DEEPEST_PX`.
     """
 
     pixels: Floats
-    sure: Floats
+    sure: NDArray[np.uint8]
     inwards: Floats
 
     @classmethod
     def of(cls, pixels: Floats, known: Mask) -> "Ground":
         """What is known, and one pixel away from what is not, since samples mix neighbours."""
         padded = np.pad(known.astype(np.uint8), 1)
-        sure = cv2.erode(padded, np.ones((3, 3), np.uint8))
-        inwards = np.minimum(cv2.distanceTransform(sure, cv2.DIST_L2, 3), DEEPEST_PX)[1:-1, 1:-1]
-        return cls(pixels, sure[1:-1, 1:-1].astype(np.float32), np.ascontiguousarray(inwards, np.float32))
+        sure = np.asarray(cv2.erode(255 * padded, np.ones((3, 3), np.uint8)), np.uint8)
+        inwards = np.asarray(cv2.distanceTransform(sure, cv2.DIST_L2, 3), np.float32)[1:-1, 1:-1]
+        return cls(pixels, sure[1:-1, 1:-1], np.minimum(inwards, np.float32(DEEPEST_PX), out=inwards))
 
     def known(self, points: Array) -> Mask:
         """Which of the points [L, 2] can be read."""
         height, width = self.sure.shape
         x, y = points[:, 0], points[:, 1]
         inside = (x >= 0) & (y >= 0) & (x <= width - 1) & (y <= height - 1)
-        return inside & (taken(self.sure, points) > 0.99)
+        return inside & (taken(self.sure, points) > 0.99 * 255)

@@ -113,12 +113,18 @@ def asked_for(
     return Asked(hole, tuple(dict.fromkeys((one.i, one.j) for one in going)))
 
 
-def marked(photo: Image, mask: str | PathLike[str] | Mask | None) -> Mask:
-    """What `mask` marks of a photo, bool [H, W]; nothing without one. Raises as `asked_for` does."""
-    hole = _marked(photo, mask)
-    if (hole | ~photo.valid).all():
+def hidden_ground(
+    photo: Image, mask: str | PathLike[str] | Mask | None, *, keep_transparent: bool
+) -> tuple[Mask, Mask]:
+    """What `mask` hides of a photo, bool [H, W], and all that is to be filled: what is transparent too.
+
+    But that not where it is to stay so. Nothing is hidden without a mask. Raises as `asked_for` does.
+    """
+    hidden = _marked(photo, mask)
+    hole = hidden | ~photo.valid
+    if hole.all():
         raise UsageError(_ALL)
-    return hole
+    return hidden, hidden if keep_transparent else hole
 
 
 def on_flat(flat: Flat, hole: Mask) -> Mask:

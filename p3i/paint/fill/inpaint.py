@@ -121,15 +121,20 @@ def inpaint(
     flat = flat_of(photo, program, focal_mm=asked.focal_mm)
     hole = wanted.hole
     flat_hole = on_flat(flat, hole)
-    found = Filled(flat.photo.pixels, np.zeros_like(flat_hole), np.zeros_like(flat_hole))
     more = continued(flat.placed, flat.photo, hole=flat_hole)
     if hole.any():
         found = _filled(flat.photo, more.joined(flat.placed), flat_hole, asked, progress)
+    else:
+        found = Filled(flat.photo.pixels, flat_hole, flat_hole)
     notes, pixels, gone = list[str](), found.pixels, np.zeros_like(flat_hole)
     notes += more.notes()
     if wanted.removed:
         ground, gone, said = _taken_away(flat.photo, flat.placed, flat_hole, wanted.removed)
-        pixels = ground if not hole.any() else np.where(gone[:, :, None], ground, pixels)
+        if hole.any():
+            np.copyto(pixels, ground, where=gone[:, :, None])
+        else:
+            pixels = ground
+        del ground  # a large photo's copies are much
         notes += [CHANGED, *said]
     guess, strange = beside_hole(flat.photo, flat.placed, flat_hole | gone)
     of_pattern = flat_hole & ~gone
@@ -138,7 +143,7 @@ def inpaint(
         pixels, parts = flat.bent(np.asarray(pixels, np.float32)), [flat.bent_mask(part) for part in parts]
     unlike, fallback, guess, strange, gone = parts
     hole = hole | (gone & photo.valid)
-    pixels = np.where(hole[:, :, None], pixels, photo.pixels).astype(np.float32, copy=False)
+    np.copyto(pixels, photo.pixels, where=~hole[:, :, None])
     reach_px = max(3.0, _BESIDE * _typical_pitch_px(flat.placed))
     facts = facts_of(hole, unlike=unlike, guess=guess, strange=strange, ground=gone, reach_px=reach_px)
     told = [one.sentence() for one in facts if one.note]

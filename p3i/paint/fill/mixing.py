@@ -1,13 +1,12 @@
-"""The picture of one piece of a hole: a mean of its sources, and grain given back by the best of them.
+"""The picture of one piece of a hole: what most of its sources show, and grain given back by the best.
 
 A mean comes closest to what is hidden, and is softer than any source: what differs between them averages
-out. How much softer is measured, as gradient energy beside that of the sources at the same places, and so
-much of what the best source shows beyond the mean is added that the piece is as sharp as the pattern is.
+out. So each place is drawn from the mean towards the sources' median, which keeps edges that most of them
+show. Where the piece is softer still than the softest source, so much of what the best source shows beyond
+it is added that it is as sharp.
 
 Convention: a window of the photo, [h, w] pixels; colours float32 RGB.
 """
-
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -24,10 +23,14 @@ Mask = NDArray[np.bool_]
 _LEAST = 1e-3
 # What a source shows is its own where it is known so far.
 _WHOLE = 0.99
-# Grain is what is finer than this, in pixels, and it is given back until the mean is as sharp as this share
-# of the sources.
+# Colours nearer than this to the mean are not told apart from it.
+_ALIKE = 0.02
+# All sources are held side by side for so many of their pixels.
+_AT_A_TIME = 4_000_000
+# Grain is what is finer than this, in pixels.
 _GRAIN_PX = 1.5
-_QUANTILE = 0.25
+GRAIN_REACH_PX = 8
+"""Grain is told from so many pixels around."""
 # So many pixels tell how sharp a window is.
 _ASKED = 40_000
 
@@ -41,75 +44,105 @@ def painted(
     corner: tuple[int, int],
     drawn: NDArray[np.uint8] | None,
     fading_px: float,
-) -> tuple[Floats, Floats]:
+    grain: float | None = None,
+) -> tuple[Floats, Floats, float]:
     """The colours [h, w, 3] of a window at `corner` (x, y) and how surely any source shows them [h, w], 0..1.
 
     Sharpness is that of the pixels `inside` [h, w]. Where a source's known ground ends it fades over
-    `fading_px`. With `drawn` [H, W] only ground of the pattern is shown.
+    `fading_px`. With `drawn` [H, W] only ground of the pattern is shown. Last how much of the best source's
+    grain was given back: what it takes, or as much as `grain` says.
     """
     height, width = inside.shape
-    total, weight = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
-    shown: list[_Shown] = []
+    mean, weight = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.float32)
     wanted = cv2.dilate(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     # Those that count little are read only where the others leave something to be shown.
-    order = np.argsort(-weights, kind="stable")
-    for place in order.tolist():
-        share = float(weights[place])
-        if share < _LEAST:
-            if (weight[wanted] > 0).all():
-                break
-            share = _LEAST
-        source = found[place]
-        read = source.window(ground, corner, (width, height), drawn=drawn, fading_px=fading_px)
-        if read is None:
-            continue
-        colours, known = read
-        counts = known * np.float32(share)
-        total += colours * counts[..., None]
-        weight += counts
-        shown.append(_shown(source.misfit, colours, known, inside, best=shown))
-    mean = (total / np.maximum(weight, 1e-9)[..., None]).astype(np.float32)
-    if len(shown) > 1:
-        _sharpen(mean, shown, inside)
-    return mean, weight
+    order = np.argsort(-weights, kind="stable").tolist()
+    sharp = {place: _Sharpness() for place in order}
+    own = _Sharpness()
+    rows = max(1, _AT_A_TIME // max(1, width * len(found)))
+    for top in range(0, height, rows):
+        band = slice(top, min(height, top + rows))
+        shape, here = (width, band.stop - top), inside[band]
+        read: list[tuple[Floats, Floats]] = []
+        for place in order:
+            share = float(weights[place])
+            if share < _LEAST:
+                if (weight[band][wanted[band]] > 0).all():
+                    break
+                share = _LEAST
+            seen = found[place].window(
+                ground, (corner[0], corner[1] + top), shape, drawn=drawn, fading_px=fading_px
+            )
+            if seen is None:
+                continue
+            sharp[place].add(seen[0], here & (seen[1] > _WHOLE))
+            read.append((seen[0], seen[1] * np.float32(share)))
+            weight[band] += read[-1][1]
+        mean[band] = _of_most(read, weight[band])
+        own.add(mean[band], here & (weight[band] > 0))
+    whole = {place: one for place, one in sharp.items() if one.pixels >= max(1, 0.5 * inside.sum())}
+    if len(whole) < 2 or grain == 0:
+        return mean, weight, 0.0
+    softest = min(one.typical() for one in whole.values())
+    if grain is None and own.typical() >= softest:
+        return mean, weight, 0.0
+    best = found[min(whole, key=lambda place: found[place].misfit)]
+    lead = best.window(ground, corner, (width, height), drawn=drawn, fading_px=fading_px)
+    if lead is None:
+        return mean, weight, 0.0
+    return mean, weight, _sharpen(mean, lead[0], lead[1], inside, energy=softest, share=grain)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shown:
-    """A source in a window: its misfit, its `energy` a pixel (None where it shows too little), its picture.
+class _Sharpness:
+    """The gradient energy of a picture that comes in bands, over its `pixels`."""
 
-    The picture, colours [h, w, 3] and how far known [h, w], is kept of the best only.
+    def __init__(self) -> None:
+        self.pixels, self.energy = 0, 0.0
+
+    def add(self, colours: Floats, where: Mask) -> None:
+        """Add what a band [h, w, 3] shows `where` [h, w]."""
+        self.pixels += int(where.sum())
+        self.energy += _energy(colours, where)
+
+    def typical(self) -> float:
+        """The energy of a pixel; 0 without any."""
+        return self.energy / max(1, self.pixels)
+
+
+def _of_most(read: list[tuple[Floats, Floats]], weight: Floats) -> Floats:
+    """What most sources show [h, w, 3]: their mean, one step of Weiszfeld (1937) towards their median.
+
+    The sources are colours [h, w, 3] and how much each counts [h, w]; `weight` [h, w] is the sum of that.
     """
+    mean = np.zeros((*weight.shape, 3), np.float32)
+    for colours, counts in read:
+        mean += colours * counts[..., None]
+    mean /= np.maximum(weight, np.float32(1e-9))[..., None]
+    if len(read) < 3:
+        return mean
+    total, under = np.zeros_like(mean), np.full(weight.shape, 1e-9, np.float32)
+    for colours, counts in read:
+        nearness = counts / (np.abs(colours - mean).mean(2) + np.float32(_ALIKE))
+        total += colours * nearness[..., None]
+        under += nearness
+    return np.asarray(total / under[..., None], np.float32)
 
-    misfit: float
-    energy: float | None
-    picture: tuple[Floats, Floats] | None
 
-
-def _shown(misfit: float, colours: Floats, known: Floats, inside: Mask, *, best: list[_Shown]) -> _Shown:
-    whole = inside & (known > _WHOLE)
-    pixels = int(whole.sum())
-    if pixels < 0.5 * inside.sum() or not pixels:
-        return _Shown(misfit, None, None)
-    leads = all(misfit < other.misfit for other in best if other.picture is not None)
-    return _Shown(misfit, _energy(colours, whole) / pixels, (colours, known) if leads else None)
-
-
-def _sharpen(mean: Floats, shown: list[_Shown], inside: Mask) -> None:
-    """Add the grain of the best source, as much as makes the mean as sharp as its sources."""
-    leading = [one for one in shown if one.picture is not None]
-    if not leading:
-        return
-    lead, known = leading[-1].picture or (mean, inside)
-    wanted = float(np.quantile([one.energy for one in shown if one.energy is not None], _QUANTILE))
+def _sharpen(
+    mean: Floats, lead: Floats, known: Floats, inside: Mask, *, energy: float, share: float | None
+) -> float:
+    """Add grain of the leading source, this share or as much as brings the mean to this energy a pixel."""
     beyond = (lead - mean) * known[..., None]
     beyond -= cv2.GaussianBlur(beyond, (0, 0), _GRAIN_PX)
-    whole = inside & (known > _WHOLE)
-    count = max(int(whole.sum()), 1)
-    plain, square = _energy(mean, whole) / count, _energy(beyond, whole) / count
-    both = _energy(mean, whole, beyond) / count
-    if share := share_to_reach(wanted, plain, both, square):
-        mean += np.float32(min(1.0, share)) * beyond
+    if share is None:
+        whole = inside & (known > _WHOLE)
+        count = max(int(whole.sum()), 1)
+        plain, square = _energy(mean, whole) / count, _energy(beyond, whole) / count
+        both = _energy(mean, whole, beyond) / count
+        share = min(1.0, share_to_reach(energy, plain, both, square))
+    if share:
+        mean += np.float32(share) * beyond
+    return share
 
 
 def share_to_reach(energy: float, plain: float, both: float, square: float) -> float:

@@ -145,7 +145,7 @@ def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed, *, target
     high = points.max(0).astype(int) + margin + 1
     free = known[low[1] : high[1], low[0] : high[0]]
     outside = np.ones(free.shape, np.uint8)
-    columns, rows = (points.astype(int) - low).T
+    columns, rows = (points - low).astype(np.int32).T
     outside[rows, columns] = 0
     distance = cv2.distanceTransform(outside, cv2.DIST_L2, 5)
     near = (distance <= margin) & (outside > 0)

@@ -11,22 +11,28 @@ smoothly.
 Convention: photos float32 RGB [H, W, 3] in 0..1; masks bool [H, W], True is to be filled.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.ground import Ground
-from p3i.paint.fill.light import MOST_CARRIED, carried, rim_of
+from p3i.paint.fill.light import MOST_CARRIED, carried_into, rim_of
 from p3i.paint.fill.matching import trusted
-from p3i.paint.fill.mixing import feathered, painted
-from p3i.paint.fill.pieces import Piece, drawn_on, padded, pieces_of
+from p3i.paint.fill.mixing import GRAIN_REACH_PX, feathered, painted
+from p3i.paint.fill.pieces import Labels, Piece, drawn_on, padded, pieces_of
+from p3i.paint.fill.scattered import Scattered, near_rims
 from p3i.paint.fill.sources import MOST_TRIED, Hole, Source, hole_of, shown_elsewhere, sources
+from p3i.paint.fill.summed import summed
 from p3i.paint.fill.survey import Survey, survey_of
 from p3i.place.moves import nearest_px, pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.fill import fill_in
+from p3i.vision.strips import Window, clipped, strips_of, wider_by, within
 from p3i.vision.warp import taken
 
 Array = NDArray[np.float64]
@@ -36,8 +42,14 @@ Progress = Callable[[str, float], None]
 
 # The rim at which the fill is compared with the photo, in pixels.
 _RIM_PX = 4
+# So far from what is known a bicubic sample of it reads.
+_READ_PX = 2
 # Cells go over into each other, and sources fade, within this share of the distance to the next object.
 _FADING = 0.08
+# So many pixels of a piece are painted at once, and so many such parts tell how much grain all of it needs.
+_MOST_PX, _ASKED = 2_000_000, 3
+# Beyond its drawn ground the pattern goes on where it is off, around the hole, by this share of what else is.
+_GOES_ON = 0.6
 # A pixel is shown where the weights of its sources come to this.
 _SHOWN = 1e-6
 
@@ -56,29 +68,31 @@ def fill_by_stack(
     What is not `known` is no source, and is not filled either unless the hole holds it. Where no source shows
     a pixel, the surroundings are continued smoothly. Fewer objects tried for each piece is faster.
     """
-    known = known & ~hole
     result = pixels.copy()
-    result[hole] = 0  # nor does what is hidden leave a trace in rounding
-    ground = Ground.of(result, known)
-    drawn = drawn_on(placed)
-    pieces, labels = pieces_of(hole, drawn, placed)
-    survey = survey_of(result, known, placed)
-    total, weight = np.zeros_like(result), np.zeros(hole.shape, np.float32)
-    for done, piece in enumerate(pieces):
-        if progress is not None:
-            progress("filling", done / len(pieces))
-        _fill(piece, labels, ground, known, hole, drawn, placed, survey, total, weight, most=most_tried)
-    shown = weight > _SHOWN
-    total /= np.maximum(weight, _SHOWN)[:, :, None]
-    sure = ground.sure
-    del ground, labels, drawn, weight  # a large photo's are much
-    _carry_rim(total, shown, result, sure, hole, placed)
+    return result, fill_in_place(result, known, hole, placed, most_tried=most_tried, progress=progress)
+
+
+def fill_in_place(
+    pixels: Floats,
+    known: Mask,
+    hole: Mask,
+    placed: Placed,
+    *,
+    most_tried: int = MOST_TRIED,
+    progress: Progress | None = None,
+) -> Mask:
+    """Do as `fill_by_stack` with the `pixels` themselves, and say where nothing like the hole was found."""
+    known = known & ~hole
+    pixels[hole] = 0  # what is hidden leaves no trace in what is mixed with its neighbours
+    shown, rim = _filled(pixels, known, hole, placed, most_tried, progress)
+    _carry_rim(pixels, rim, hole, placed)
     filled = hole & shown
-    np.copyto(result, np.clip(total, 0, 1, out=total), where=filled[:, :, None])
+    for rows in strips_of(len(hole)):
+        np.copyto(pixels[rows], np.clip(pixels[rows], 0, 1), where=filled[rows][:, :, None])
     bare = hole & ~shown
     if bare.any():
-        fill_in(result, known | filled, bare)
-    return result, bare
+        fill_in(pixels, known | filled, bare)
+    return bare
 
 
 def unlike(pixels: Floats, known: Mask, hole: Mask, placed: Placed) -> Mask:
@@ -95,61 +109,150 @@ def unlike(pixels: Floats, known: Mask, hole: Mask, placed: Placed) -> Mask:
     return found
 
 
-def _points(piece: Piece, labels: NDArray[np.int32], hole: Mask) -> Array:
+def _points(piece: Piece, labels: Labels, hole: Mask) -> Array:
     """The pixels [L, 2] of a piece."""
     left, top, right, bottom = piece.box
     here = (labels[top:bottom, left:right] == piece.number) & hole[top:bottom, left:right]
     return (np.argwhere(here)[:, ::-1] + np.array([left, top])).astype(float)
 
 
-def _fill(
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """A piece, the sources that it is filled from and how much each counts, [S].
+
+    They show what lies on `allowed` ground [H, W], None is all, and fade over `fading_px`; the piece's
+    `window` holds as much around it.
+    """
+
+    piece: Piece
+    found: list[Source]
+    weights: Array
+    allowed: NDArray[np.uint8] | None
+    window: Window
+    fading_px: int
+
+
+def _filled(
+    pixels: Floats, known: Mask, hole: Mask, placed: Placed, most: int, progress: Progress | None
+) -> tuple[Mask, Scattered]:
+    """Fill the hole of `pixels`, 0 in it, and say what was shown at all [H, W], and what would be on its rim.
+
+    First all pieces are planned, then they are painted: so none reads what another was filled with.
+    """
+    ground, drawn = Ground.of(pixels, known), drawn_on(placed)
+    pieces, labels = pieces_of(hole, drawn, placed)
+    allowed = drawn, 1 - drawn if any(piece.beyond for piece in pieces) else drawn
+    survey = survey_of(pixels, known, placed)
+
+    def told(done: float, of: int) -> None:
+        if progress is not None:
+            progress("filling", done / (2 * of))
+
+    plans: list[_Plan] = []
+    for done, piece in enumerate(pieces):
+        told(done, len(pieces))
+        one = hole_of(_points(piece, labels, hole), pixels, known, placed, target=piece.target)
+        plan = _planned(piece, one, ground, allowed[piece.beyond], placed, survey, most=most)
+        if plan is not None:
+            plans.append(plan)
+
+    def added() -> Iterator[tuple[Window, tuple[Floats, Floats]]]:
+        grains = [_grain(plan, labels, ground, hole) for plan in plans]
+        parts = [(part, number) for number, plan in enumerate(plans) for part in _parts(plan)]
+        for done, (part, number) in enumerate(sorted(parts, key=lambda one: one[0][0].start)):
+            told(len(parts) + done, len(parts))
+            colours, share, _ = _painted(plans[number], part, labels, ground, hole, grains[number])
+            yield part, (colours, share)
+
+    shown, edges = np.zeros_like(hole), list[Scattered]()
+    for strip in summed(hole.shape, added()):
+        shown[strip.rows] = found = strip.weight > _SHOWN
+        strip.total[...] /= np.maximum(strip.weight, _SHOWN)[:, :, None]
+        # What sources are read with where known ground ends stays 0 until all pieces are painted.
+        edge = near_rims(hole, strip.rows, outwards=_RIM_PX, inwards=_READ_PX)
+        edges.append(Scattered.of(strip.total, edge & found, top=strip.rows.start))
+        inner = hole[strip.rows] & found & ~edge
+        np.copyto(pixels[strip.rows], strip.total, where=inner[:, :, None])
+    edge = Scattered.joined(edges)
+    edge.part(hole).write_to(pixels)
+    return shown, edge.part(~hole & (ground.sure > 0))
+
+
+def _planned(
     piece: Piece,
-    labels: NDArray[np.int32],
+    one: Hole,
     ground: Ground,
-    known: Mask,
-    hole: Mask,
-    drawn: NDArray[np.uint8],
+    allowed: NDArray[np.uint8] | None,
     placed: Placed,
     survey: Survey | None,
-    total: Floats,
-    weight: Floats,
     *,
     most: int,
-) -> None:
-    """Add a piece's colours to the total [H, W, 3], times its weight, which is added to the weight [H, W]."""
-    points = _points(piece, labels, hole)
-    one = hole_of(points, ground.pixels, known, placed, target=piece.target)
+) -> _Plan | None:
+    """How a piece is to be filled; None where nothing is like it."""
     if piece.beyond and not one.weights.any():
-        return
-    allowed = 1 - drawn if piece.beyond else drawn
+        return None
     found = sources(one, ground, placed, most=most, survey=survey, allowed=allowed)
-    if not found:
-        return
     weights = weighed(one, ground, found)
+    if piece.beyond:
+        # A program may end before its pattern does: what lies around decides.
+        either = sources(one, ground, placed, most=most, survey=survey)
+        either_weights = weighed(one, ground, either)
+        if _off(one, ground, either, either_weights) < _GOES_ON * _off(one, ground, found, weights):
+            found, weights, allowed = either, either_weights, None
+    if not found:
+        return None
     radius = max(1, round(_FADING * one.spacing_px))
-    margin = radius + _RIM_PX + 1
-    height, width = hole.shape
-    left, top = max(0, piece.box[0] - margin), max(0, piece.box[1] - margin)
-    right, bottom = min(width, piece.box[2] + margin), min(height, piece.box[3] + margin)
-    window = (slice(top, bottom), slice(left, right))
-    own = labels[window] == piece.number
-    colours, sure = painted(
-        ground,
-        found,
-        weights,
-        own & hole[window],
-        corner=(left, top),
-        drawn=allowed,
-        fading_px=radius,
+    left, top, right, bottom = piece.box
+    window = wider_by((slice(top, bottom), slice(left, right)), radius + _RIM_PX + 1, ground.sure.shape)
+    return _Plan(piece, found, weights, allowed, window, radius)
+
+
+def _parts(plan: _Plan) -> list[Window]:
+    """The window of a plan in strips of no more pixels than are painted at once."""
+    rows, columns = plan.window
+    most = max(1, _MOST_PX // (columns.stop - columns.start))
+    count = -(-(rows.stop - rows.start) // most)
+    ends = np.linspace(rows.start, rows.stop, count + 1).astype(int).tolist()
+    return [(slice(*part), columns) for part in pairwise(ends)]
+
+
+def _grain(plan: _Plan, labels: Labels, ground: Ground, hole: Mask) -> float | None:
+    """How much grain a piece needs that is painted in parts, told by some of them; None for one part."""
+    parts = _parts(plan)
+    if len(parts) == 1:
+        return None
+    some = [parts[place] for place in np.linspace(0, len(parts) - 1, min(len(parts), _ASKED)).astype(int)]
+    return float(np.median([_painted(plan, part, labels, ground, hole)[2] for part in some]))
+
+
+def _painted(
+    plan: _Plan, part: Window, labels: Labels, ground: Ground, hole: Mask, grain: float | None = None
+) -> tuple[Floats, Floats, float]:
+    """A piece's colours [h, w, 3] in a part of its window, their weight [h, w], and how much grain it is."""
+    rows, columns = wider = clipped(
+        wider_by(part, max(GRAIN_REACH_PX, plan.fading_px), hole.shape), plan.window
     )
-    share = feathered(own, radius) * (sure > _SHOWN)
-    total[window] += colours * share[..., None]
-    weight[window] += share
+    own = labels[wider] == plan.piece.number
+    colours, sure, given = painted(
+        ground,
+        plan.found,
+        plan.weights,
+        own & hole[wider],
+        corner=(columns.start, rows.start),
+        drawn=plan.allowed,
+        fading_px=plan.fading_px,
+        grain=grain,
+    )
+    inner = within(part, wider)
+    share = feathered(own, plan.fading_px) * (sure > _SHOWN)
+    return colours[inner], share[inner], given
 
 
 def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     """How much each source counts, [S], together 1: least squares on the surroundings, drawn to a prior."""
     misfits = np.array([source.misfit for source in found])
+    if not found:
+        return misfits
     if not hole.weights.any():
         return trusted(np.zeros((len(found), 0, 3)), hole.weights, misfits)
     residuals = []
@@ -161,19 +264,48 @@ def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
     return trusted(np.stack(residuals), hole.weights, misfits, share=hole.share)
 
 
-def _carry_rim(total: Floats, shown: Mask, pixels: Floats, sure: Floats, hole: Mask, placed: Placed) -> None:
-    """Add to the fill `total` what the photo differs by from it at the hole's rim, carried inwards."""
+def _off(hole: Hole, ground: Ground, found: list[Source], weights: Array) -> float:
+    """How much the mean of sources differs from what lies around a hole; inf where they show none of it."""
+    total, shown = np.zeros_like(hole.around, shape=hole.colours.shape), np.zeros(len(hole.around))
+    for source, weight in zip(found, weights, strict=True):
+        at, front = source.where(hole.around)
+        counts = weight * (front & ground.known(at))
+        total += counts[:, None] * (source.gain * taken(ground.pixels, at) + source.offset)
+        shown += counts
+    off = np.abs(total / np.maximum(shown, _SHOWN)[:, None] - hole.colours).mean(1)
+    told = hole.weights * (shown > _SHOWN)
+    return float((told * off).sum() / told.sum()) if told.any() else np.inf
+
+
+def _carry_rim(pixels: Floats, rim: Scattered, hole: Mask, placed: Placed) -> None:
+    """Add to the fill of each hole what the photo differs by from it at its rim, carried inwards.
+
+    `rim` has what the fill would be there.
+    """
+    rim = Scattered(
+        rim.rows, rim.columns, np.clip(rim.shown_by(pixels) - rim.colours, -MOST_CARRIED, MOST_CARRIED)
+    )
     _, parts, boxes, middles = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
     for number in range(1, len(boxes)):
         left, top, right, bottom = padded(boxes[number], hole.shape, by_px=_RIM_PX + 1)
-        window = (slice(top, bottom), slice(left, right))
-        inside = (parts[window] == number).astype(np.uint8)
-        rim = rim_of(inside, (sure[window] > 0) & shown[window], reach_px=_RIM_PX)
-        if not rim.any():
-            continue
+        own = np.asarray(parts, np.int32)[top:bottom, left:right]
+
+        read = partial(_rim_in, own=own, number=number, rim=rim, corner=(left, top))
         spacing = pitch_px(placed, nearest_px(placed, middles[number]))
-        off = np.zeros((*rim.shape, 3), np.float32)
-        off[rim] = np.clip(pixels[window][rim] - total[window][rim], -MOST_CARRIED, MOST_CARRIED)
-        lift = carried(off, rim.astype(np.float32), spacing_px=spacing)
-        del off
-        np.add(total[window], lift, out=total[window], where=inside[..., None] > 0)
+        for window, lift in carried_into(read, own.shape, spacing_px=spacing):
+            here = pixels[top:bottom, left:right][window]
+            np.add(here, lift, out=here, where=(own[window] == number)[:, :, None])
+
+
+def _rim_in(
+    window: Window, own: NDArray[np.int32], number: int, rim: Scattered, corner: tuple[int, int]
+) -> tuple[Floats, Mask]:
+    """What the rim of one hole lacks in a window of a larger one, [h, w, 3], and where that rim is [h, w].
+
+    The larger one lies at `corner`; `own` [H, W] numbers its holes.
+    """
+    wider = wider_by(window, _RIM_PX + 1, own.shape)
+    off, told = rim.read(wider, corner)
+    inner = within(window, wider)
+    rim_here = rim_of(own[wider] == number, told, reach_px=_RIM_PX)[inner]
+    return off[inner] * rim_here[:, :, None], rim_here

@@ -11,7 +11,6 @@ from marked import LATTICE, RING, drawn
 from p3i import loads
 from p3i.errors import FileError, UsageError
 from p3i.evaluation.scenes import scene
-from p3i.paint.fill import light
 from p3i.paint.fill.holes import parse_index
 from p3i.paint.fill.inpaint import inpaint
 from p3i.place.moves import moves
@@ -227,14 +226,3 @@ def test_without_pypatchmatch_the_extra_is_named(monkeypatch: pytest.MonkeyPatch
     photo = drawn(LATTICE)
     with pytest.raises(UsageError, match=r"p3i\[patchmatch\]"):
         inpaint(photo, loads(LATTICE), mask=cell_hole(photo, LATTICE, 31), method="patchmatch")
-
-
-def test_what_a_rim_lacks_is_carried_alike_on_a_reduced_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows, columns = np.mgrid[:300, :420]
-    rim = (np.abs(np.hypot(rows - 150, columns - 210) - 120) < 3).astype(np.float32)
-    off = (rim * np.where(columns < 210, 0.1, -0.05))[:, :, None].repeat(3, 2).astype(np.float32)
-    reduced = light.carried(off, rim, spacing_px=260)
-    monkeypatch.setattr(light, "_COARSE_SIGMA", 1e9)
-    exact = light.carried(off, rim, spacing_px=260)
-    assert np.abs(exact).max() > 0.03
-    assert np.abs(reduced - exact).max() < 0.5 / 255

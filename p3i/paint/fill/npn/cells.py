@@ -17,11 +17,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from p3i.interp.camera import project
 from p3i.place.moves import moves, nearest, pitch_px
 from p3i.place.placed import Placed
 from p3i.size import Size
+from p3i.vision import sheet
 from p3i.vision.image import Image, resized, resized_from_photo
-from p3i.vision.sheet import project
 from p3i.vision.warp import pixel_grid, sample
 
 Array = NDArray[np.float64]
@@ -94,16 +95,11 @@ class Cells:
 def laid(views: Tensor, patch: Size) -> tuple[Tensor, Tensor]:
     """Where the pixels of a patch lie under views [..., 3, 3]: points [..., h, w, 2] float32, and which in
     front."""
-    grid = pixel_grid(patch, dtype=views.dtype, device=views.device).reshape(-1, 2)
-    rows = torch.cat([grid, torch.ones_like(grid[:, :1])], 1).T
-    found = views @ rows
-    depth = found[..., 2, :]
-    front = depth > 1e-9
-    points = (found[..., :2, :] / torch.where(front, depth, 1.0)[..., None, :]).transpose(-1, -2)
-    shape = (*views.shape[:-2], patch.height, patch.width)
+    points, front = project(views, pixel_grid(patch, dtype=views.dtype, device=views.device).reshape(-1, 2))
     # nan would be read as a corner; float32 is what the photo is read in.
     points = torch.nan_to_num(points, nan=-1e6).clamp(-1e6, 1e6).float()
-    return points.reshape(*shape, 2), front.reshape(shape)
+    rows = (patch.height, patch.width)
+    return points.unflatten(-2, rows), front.unflatten(-1, rows)
 
 
 def cells_of(photo: Image, placed: Placed, hole: Mask, bare: Mask, *, device: torch.device) -> Cells:
@@ -130,7 +126,7 @@ def cells_of(photo: Image, placed: Placed, hole: Mask, bare: Mask, *, device: to
     )
     views = from_photo @ placed.image_from_plane @ moves(placed, reference) @ plane_from_patch @ offset
     grid = pixel_grid(Size(width, height), dtype=torch.float64).numpy().reshape(-1, 2)
-    on_plane, _ = project(plane_from_patch @ offset, grid)
+    on_plane, _ = sheet.project(plane_from_patch @ offset, grid)
     return Cells(
         from_photo,
         pixels,
@@ -217,7 +213,7 @@ def _box(placed: Placed, reference: int, pitch: float) -> tuple[Array, Array, Ar
     plane_from_offset[:2, 2] = center
     reach = np.linspace(-_MOST_REACH, _MOST_REACH, 81) * pitch
     offsets = np.stack(np.meshgrid(reach, reach), -1).reshape(-1, 2)
-    on_plane, _ = project(plane_from_offset, offsets)
+    on_plane, _ = sheet.project(plane_from_offset, offsets)
     mine = offsets[nearest(placed, on_plane) == reference]
     margin = _MARGIN * pitch
     return plane_from_offset, mine.min(0) - margin, mine.max(0) + margin
