@@ -24,8 +24,8 @@ _MOST_SPOTS = 70
 # as do their widths.
 _LEAST_COSINE = 0.85
 _MOST_STRONGER = 2.5
-# Each spot is tried with this many of the spots like it and with half as many of the nearest, in so many
-# draws of five each.
+# Each spot is tried with this many of the spots like it, and with the nearest, twice as many as fix an
+# ellipse, in so many draws of five each.
 _FELLOWS = 16
 _DRAWS = 75
 # A spot lies on an ellipse where it is this close, as a share of the ellipse's size, and in pixels.
@@ -112,9 +112,8 @@ def _ellipses(spots: _Spots, longer: int, generator: np.random.Generator) -> lis
         nearest = nearest[nearest != spot]
         if len(nearest) < _FEWEST - 1:
             continue
-        closest = fellows[np.argsort(np.hypot(*(spots.at[fellows] - spots.at[spot]).T))][
-            1 : _FELLOWS // 2 + 1
-        ]
+        away = np.hypot(*(spots.at[fellows] - spots.at[spot]).T)
+        closest = fellows[np.argsort(away)][1 : 2 * _FEWEST + 1]
         five = np.concatenate([_fives(spot, nearest, generator), _fives(spot, closest, generator)])
         conics = _conics(spots.at[five], longer)
         off, angle, share = _off_and_angles(conics, spots.at[fellows], longer)
