@@ -191,7 +191,10 @@ def _known(pixels: Floats, valid: Mask, rows: slice) -> tuple[Floats, Floats]:
 
 
 def _read(pixels: Floats, valid: Mask, points: NDArray) -> tuple[Floats, Floats]:
-    """What is known of a photo at points [K, 2], [K, 3], and how far that is [K], strip by strip."""
+    """What is known [N, 3] of a photo [H, W, 3] and its `valid` pixels [H, W] at points [N, 2], by strips.
+
+    And how far that is [N].
+    """
     found, known = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
     for rows in strips_of(len(pixels)):
         here = np.flatnonzero((points[:, 1] >= rows.start) & (points[:, 1] < rows.stop))

@@ -81,7 +81,10 @@ def fill_in_place(
     most_tried: int = MOST_TRIED,
     progress: Progress | None = None,
 ) -> Mask:
-    """Do as `fill_by_stack` with the `pixels` themselves, and say where nothing like the hole was found."""
+    """Do as `fill_by_stack` with the `pixels` [H, W, 3] themselves; `known` and `hole` are [H, W].
+
+    Returns where nothing like the hole was found [H, W].
+    """
     known = known & ~hole
     pixels[hole] = 0  # what is hidden leaves no trace in what is mixed with its neighbours
     shown, rim = _filled(pixels, known, hole, placed, most_tried, progress)
