@@ -63,19 +63,32 @@ def on_asked_circle(session: Session, answer: Answer) -> Answer:
     asked = session.config.object
     if asked is None or answer.structure != "circular":
         return answer
-    each = (answer, *other_readings(session, answer, most=len(answer.readings)))
-    return next((one for one in each if _is(_drawn(one), asked, one)), answer)
+    reading = next((one for one in answer.readings if _is(one, asked, answer)), None)
+    if reading is None or reading.drawn:
+        return answer
+    return _drawn_on(session, answer, reading) or answer
 
 
 def _others(session: Session, answer: Answer) -> Iterator[Answer]:
-    evidence = session.evidence.under(answer.focal_mm or session.evidence.focal_mm)
-    moved = _lattice_on if answer.structure == "lattice" else _ring_on
     for reading in answer.readings:
-        program = None if reading.drawn else moved(evidence, answer, reading)
-        if program is not None:
-            readings = _seen_from(reading, answer.readings)
-            other = replace(answer, program=program, readings=readings, notes=())
-            yield replace(explained(session.evidence, other), score=score_of_program(evidence, program))
+        other = None if reading.drawn else _drawn_on(session, answer, reading)
+        if other is not None:
+            yield replace(other, notes=())
+
+
+def _drawn_on(session: Session, answer: Answer, reading: Reading) -> Answer | None:
+    """An answer with its objects on another place; None where there are none.
+
+    Through a lens it keeps its bits and its score: they are told on another picture.
+    """
+    evidence = session.evidence.under(answer.focal_mm or session.evidence.focal_mm)
+    program = (_lattice_on if answer.structure == "lattice" else _ring_on)(evidence, answer, reading)
+    if program is None:
+        return None
+    other = replace(answer, program=program, readings=_seen_from(reading, answer.readings))
+    if answer.lens_k1 is not None:
+        return other
+    return replace(explained(session.evidence, other), score=score_of_program(evidence, program))
 
 
 def _lattice_on(evidence: Evidence, answer: Answer, reading: Reading) -> Program | None:

@@ -13,6 +13,7 @@ from truth import lattice_of
 from p3i.grammar.ast import Affine as A
 from p3i.grammar.ast import CameraPose, Draw, For, Program
 from p3i.grammar.leaves import leaves
+from p3i.grammar.parser import parse
 from p3i.interp.compile import compile
 from p3i.search.answer import Answer
 from p3i.search.config import SearchConfig
@@ -20,7 +21,8 @@ from p3i.search.extent.layout import found_layout
 from p3i.search.forms.lattice import Lattice
 from p3i.search.forms.layout import Layout
 from p3i.search.look.evidence import Evidence
-from p3i.search.readings import offers, reading_notes
+from p3i.search.look.session import Session
+from p3i.search.readings import offers, on_asked_circle, reading_notes
 from p3i.search.result import Reading, StopReason, SynthesisResult
 from p3i.search.synthesize import synthesize
 from p3i.size import Size
@@ -245,3 +247,20 @@ def test_the_readings_of_a_program_are_told_from_what_it_draws() -> None:
     steps = (at - likeliest) @ np.linalg.inv(layout.lattice.basis)
     assert np.abs(steps - np.round(steps)).max() < 1e-6
     assert len(compile(layout.program()).index) > 20
+
+
+def test_through_a_lens_the_circle_that_was_asked_for_is_drawn_too() -> None:
+    ring = parse(
+        "SetCameraPose(rx=0, ry=0)\nfor j in range(0, 9):\n"
+        "    Draw(x=20*Cos(40*j + 10) + 0, y=20*Sin(40*j + 10) + 0)\n"
+    )
+    here, there = Reading("1", 0.6, (0.0, 0.0)), Reading("2", 0.4, (0.0, 0.5), 1.5)
+    told = Answer(ring, "circular", 0.5, 100.0, readings=(here, there), lens_k1=0.05, notes=("kept",))
+    config = SearchConfig(structure="circular", object="2")
+    look = Session(Evidence(sheet(chequered=False), config, FOCAL_MM), config)
+    moved = on_asked_circle(look, told)
+    assert leaves(moved.program)["draw.x.radius.1"] == pytest.approx(30)
+    assert offers(moved, config) and moved.notes == ("kept",)
+    assert (
+        on_asked_circle(Session(Evidence(sheet(chequered=False), config, FOCAL_MM), config), moved) is moved
+    )

@@ -180,3 +180,12 @@ def test_a_start_that_the_sketch_cannot_say_is_no_reason_to_look_no_further(
     assert len(next(rounds)) == 1
     best.found.append(Found(own, None, (near,)))  # pyright: ignore[reportArgumentType]
     assert (next(rounds, None) is not None) == looked
+
+
+def test_a_sketch_of_which_only_a_range_is_open_keeps_its_numbers() -> None:
+    """With no number to move it ended in a tensor of the wrong kind."""
+    text = TRUTH["staggered row"].replace("range(0, 7)", "range(0, ?n(4, 10))")
+    result = p3i.synth(scene("staggered row").image(), sketch=sketch(text))
+    assert result.program is not None, result.reason
+    assert leaves(result.program) == leaves(p3i.loads(TRUTH["staggered row"]))
+    assert len(result.centers) == 14

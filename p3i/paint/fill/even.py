@@ -36,7 +36,7 @@ class Even:
     @classmethod
     def of(cls, ground: Mask, *, sigma: float) -> "Even":
         """For a ground [H, W] and so many pixels."""
-        reduce = 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
+        reduce = reduction(sigma)
         weight = _reduced(ground.astype(np.float32), reduce)
         sigma = sigma * weight.shape[1] / ground.shape[1]
         return cls(ground, reduce, sigma, np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma), np.float32))
@@ -58,6 +58,11 @@ class Even:
         return np.asarray(
             cv2.resize(even, self.ground.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32
         )
+
+
+def reduction(sigma: float) -> int:
+    """How many times smaller a picture may be on which what is smooth over so many pixels is computed."""
+    return 2 ** max(0, int(np.log2(sigma / _FINEST_SIGMA)))
 
 
 def _reduced(values: Floats, reduce: int) -> Floats:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.paint.fill.even import reduction
 from p3i.vision.strips import Window, strips_of, wider_by, within
 
 Array = NDArray[np.float64]
@@ -29,9 +30,8 @@ MOST_CARRIED = 0.15
 # each of these: at the rim its own difference counts, further in that of more.
 _SMOOTH = 0.125
 _SCALES = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
-# Where a smoothing is over this many pixels the rim is reduced first, until it is over so many.
+# Where a smoothing is over this many pixels the rim is reduced first.
 _COARSE_SIGMA = 16.0
-_LEAST_SIGMA = 4.0
 _FINEST_PX = 0.7
 # A bell reaches so many sigmas; a picture is carried into in parts of twice that, or of so many pixels.
 _REACH = 4.0
@@ -144,7 +144,7 @@ class _Coarse:
         """What bells make of a rim, together: (scale, sigma), each twice as wide as the one before."""
         height, width = shape
         sigma = bells[0][1]
-        reduce = 2 ** int(np.log2(sigma / _LEAST_SIGMA))
+        reduce = reduction(sigma)
         small = np.zeros((-(-height // reduce), -(-width // reduce), 4), np.float32)
         for rows in strips_of(height, max(reduce, _PART_PX // reduce * reduce)):
             off, rim = read((rows, slice(0, width)))

@@ -16,7 +16,7 @@ from p3i.place.moves import nearest, nearest_px, pitch_px
 from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
 from p3i.vision.sheet import project
-from p3i.vision.strips import strips_of
+from p3i.vision.strips import strips_of, wider_by
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -138,10 +138,8 @@ def _nearest_to_middle(
 def padded(box: NDArray, shape: tuple[int, ...], *, by_px: int) -> Box:
     """A box (x, y, width, height, ...) as OpenCV tells it, wider on each side within a picture [H, W]."""
     left, top, wide, high = (int(value) for value in box[:4])
-    return (
-        max(0, left - by_px), max(0, top - by_px),
-        min(shape[1], left + wide + by_px), min(shape[0], top + high + by_px),
-    )  # fmt: skip
+    rows, columns = wider_by((slice(top, top + high), slice(left, left + wide)), by_px, shape)
+    return columns.start, rows.start, columns.stop, rows.stop
 
 
 def _sides_in(box: Box, drawn: NDArray[np.uint8], placed: Placed) -> NDArray[np.int32]:

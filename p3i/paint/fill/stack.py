@@ -258,26 +258,32 @@ def weighed(hole: Hole, ground: Ground, found: list[Source]) -> Array:
         return misfits
     if not hole.weights.any():
         return trusted(np.zeros((len(found), 0, 3)), hole.weights, misfits)
-    residuals = []
-    for source in found:
-        at, front = source.where(hole.around)
-        colours = source.gain * taken(ground.pixels, at) + source.offset
-        shown = (front & ground.known(at))[:, None]
-        residuals.append(np.where(shown, colours - hole.colours, 0))
-    return trusted(np.stack(residuals), hole.weights, misfits, share=hole.share)
+    residuals, _ = _around(hole, ground, found)
+    return trusted(residuals, hole.weights, misfits, share=hole.share)
 
 
 def _off(hole: Hole, ground: Ground, found: list[Source], weights: Array) -> float:
     """How much the mean of sources differs from what lies around a hole; inf where they show none of it."""
-    total, shown = np.zeros_like(hole.around, shape=hole.colours.shape), np.zeros(len(hole.around))
-    for source, weight in zip(found, weights, strict=True):
-        at, front = source.where(hole.around)
-        counts = weight * (front & ground.known(at))
-        total += counts[:, None] * (source.gain * taken(ground.pixels, at) + source.offset)
-        shown += counts
-    off = np.abs(total / np.maximum(shown, _SHOWN)[:, None] - hole.colours).mean(1)
-    told = hole.weights * (shown > _SHOWN)
+    if not found:
+        return np.inf
+    residuals, shown = _around(hole, ground, found)
+    counts = (weights[:, None] * shown).sum(0)
+    off = np.abs((weights[:, None, None] * residuals).sum(0) / np.maximum(counts, _SHOWN)[:, None]).mean(1)
+    told = hole.weights * (counts > _SHOWN)
     return float((told * off).sum() / told.sum()) if told.any() else np.inf
+
+
+def _around(hole: Hole, ground: Ground, found: list[Source]) -> tuple[Array, Mask]:
+    """What sources differ by from what lies around a hole [S, K, 3], 0 where they show none, and where they
+    do [S, K].
+    """
+    residuals, shown = [], []
+    for source in found:
+        at, front = source.where(hole.around)
+        colours = source.gain * taken(ground.pixels, at) + source.offset
+        shown.append(front & ground.known(at))
+        residuals.append(np.where(shown[-1][:, None], colours - hole.colours, 0))
+    return np.stack(residuals), np.stack(shown)
 
 
 def _carry_rim(pixels: Floats, rim: Scattered, hole: Mask, placed: Placed) -> None:

@@ -98,6 +98,8 @@ def _middle(patch: _MeanPatch) -> Tensor | None:
 def _moved(fit: Fit, targets: Tensor) -> Tensor:
     """The numbers z [F] that draw closest to `targets` [N, 2] (program units) under the same camera."""
     filling, z = fit.filling, fit.z
+    if all(unknown.name.startswith("camera.") for unknown in filling.moving):
+        return z
     held = torch.tensor([unknown.name.startswith("camera.") for unknown in filling.moving])
     limits = moving_limits(filling, z).where(~held, 0.0)
 

@@ -128,6 +128,8 @@ def _shifted(filling: Filling, z: Tensor, shift: tuple[float, float]) -> Tensor 
 
 def _turned(filling: Filling, z: Tensor) -> Tensor:
     """Angles brought back by whole turns into the limits that a person gave, where they can be."""
-    turns = torch.tensor([unknown.range.turns and unknown.hard for unknown in filling.moving])
+    turns = torch.tensor(
+        [unknown.range.turns and unknown.hard for unknown in filling.moving], dtype=torch.bool
+    )
     lower = torch.tensor([unknown.range.lower for unknown in filling.moving]).double()
     return torch.where(turns, lower + (z - lower) % 360, z)
