@@ -5,6 +5,8 @@ the small one's pixels were. Both come again exactly, in squares along the pictu
 they do so in where edges are, not in what the colours are: each block shows something else.
 """
 
+import math
+
 import torch
 from torch import Tensor
 
@@ -13,6 +15,9 @@ from torch import Tensor
 _NEAR = 0.15
 # A step goes over so many squares at most, to the side and down.
 _MOST_SQUARES = 3
+# Squares are no larger than two blocks, which one value of halved colours covers. Larger ones along the sides
+# are a board that faces the camera.
+_MOST_SIDE_PX = 17.0
 
 
 def on_own_grid(points_px: Tensor, index: Tensor) -> bool:
@@ -22,7 +27,9 @@ def on_own_grid(points_px: Tensor, index: Tensor) -> bool:
     for part in range(1, _MOST_SQUARES + 1):
         squares = (part * steps / steps.abs().max()).round()
         side = float((steps * squares).sum() / squares.square().sum())
+        if not 0 < side <= _MOST_SIDE_PX or math.gcd(*squares.int().flatten().tolist()) > 1:
+            continue
         away = points_px - index @ (side * squares)
-        if side > 0 and float((away - away.mean(0)).square().sum(1).mean().sqrt()) < _NEAR * side:
+        if float((away - away.mean(0)).square().sum(1).mean().sqrt()) < _NEAR * side:
             return True
     return False
