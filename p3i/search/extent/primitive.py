@@ -8,6 +8,7 @@ of several kinds without a rule, the kinds are never spread evenly: there the fi
 beside the coarser.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -31,6 +32,7 @@ from p3i.search.look.cells import (
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import MOST_READ
 from p3i.search.look.thinned import thinned
+from p3i.search.result import NEEDED_BITS
 
 # Rows: u and v of each sublattice of index 2 in units of the lattice's.
 _DOUBLES = ([[2, 0], [0, 1]], [[1, 0], [0, 2]], [[1, 1], [1, -1]])
@@ -43,6 +45,7 @@ _LEAST_AGREEMENT = 0.2
 # Where so many of the cells know their coset, the cosets are kinds, and the doubled cell is the period:
 # halfway between one half, which is no rule, and all.
 _TOLD = 0.75
+_TRIED = math.log2(2 * len(_DOUBLES))  # features and colours, and each way to double the cell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,14 +68,13 @@ def primitive(evidence: Evidence, pattern: Pattern, fit: Fit) -> list[tuple[Tens
     if len(found.index) < FEWEST_OBJECTS:
         return [(found.theta, found.index)]
     coarser, told = _coarser(evidence, pattern, found)
-    both = [found] if coarser is None else [coarser] if told >= _TOLD else [coarser, found]
+    both = [found] if coarser is None else [coarser] if told else [coarser, found]
     return [(one.theta, one.index) for one in both]
 
 
-def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Ground | None, float]:
-    """The lattice with a doubled cell that tells apart what the present one mixes, if any, and how surely.
-
-    How surely is the share of the cells that are more like the others of their own coset.
+def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Ground | None, bool]:
+    """The lattice with a doubled cell that tells apart what the present one mixes, if any, and whether the
+    cells know it surely: `_told`.
     """
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     for rows in _DOUBLES:
@@ -83,25 +85,25 @@ def _coarser(evidence: Evidence, pattern: Pattern, ground: _Ground) -> tuple[_Gr
         if likeness < _DIFFERENT and (best is None or likeness < best[0]):
             best = likeness, factors, coset
     if best is None:
-        return None, 0.0
+        return None, False
     lattice = Lattice.of(pattern, ground.theta)
     basis, change = _reduced(best[1].astype(float) @ lattice.basis)
     index = ground.index.numpy() @ np.linalg.inv(best[1])
     whole = (np.abs(index - np.round(index)) < 1e-6).all(1)
     if whole.sum() < FEWEST_OBJECTS:
-        return None, 0.0
+        return None, False
     index = torch.from_numpy(np.round(index[whole]) @ change)
     return _Ground(lattice.with_basis(basis).theta(pattern), index), _told(evidence, pattern, ground, best[2])
 
 
-def _told(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray) -> float:
-    """The share of the cells that agree better with the others of their coset [N] than with the other coset.
+def _told(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarray) -> bool:
+    """Whether the cells agree better with the others of their coset [N] than with the other coset.
 
     All of a chequered floor's do, dark with dark. Where fields of several kinds lie without a rule, most are
     of one kind and agree best with the coset that has more of it, whichever is theirs: then about half do.
-    In the features that tell the cosets apart best.
+    In the features that tell the cosets apart best; of so few cells that as many would by chance, for one of
+    the features and doubled cells that were tried, it is not known.
     """
-    most = 0.0
     for groups in _by_coset(evidence, pattern, ground, coset):
         means = [mean_cell(group, torch.ones(len(group.values)))[0] for group in groups]
         lead = [
@@ -109,8 +111,18 @@ def _told(evidence: Evidence, pattern: Pattern, ground: _Ground, coset: np.ndarr
             - agreement(group.values, means[1 - place][None], group.known)
             for place, group in enumerate(groups)
         ]
-        most = max(most, min(float((one > 0).double().mean()) for one in lead))
-    return most
+        shares = [(float((one > 0).double().mean()), len(one)) for one in lead]
+        if all(
+            share >= _TOLD and count * _bits_a_toss(share) > _TRIED + NEEDED_BITS for share, count in shares
+        ):
+            return True
+    return False
+
+
+def _bits_a_toss(share: float) -> float:
+    """What speaks against chance, in bits a toss, where this share of tosses of a coin fell on one side."""
+    entropy = -sum(p * math.log2(p) for p in (share, 1 - share) if p > 0)
+    return 1 - entropy
 
 
 def _reduced(basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
