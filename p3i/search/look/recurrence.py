@@ -211,7 +211,8 @@ def _independent(products: NDArray[np.complex64]) -> NDArray[np.float64]:
 def _independent_of_rows(rows: list[NDArray[np.complex64]]) -> NDArray[np.float64]:
     """How many independent samples each wave of sectors has, by what rows [M, n, K] do not share: [M].
 
-    Of a single row nothing is independent of the rest, so it tells itself: `_independent`.
+    Of a single row nothing is independent of the rest, so it tells itself: `_independent`. At most as many as
+    so few sectors can tell.
     """
     if len(rows) < 2:
         return _independent(rows[0] @ np.conj(np.swapaxes(rows[0], 1, 2)))
@@ -221,4 +222,5 @@ def _independent_of_rows(rows: list[NDArray[np.complex64]]) -> NDArray[np.float6
     gram = np.abs(rest @ np.conj(np.swapaxes(rest, 1, 2))) ** 2
     own = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
     every = (own[:, :, None] * own[:, None])[:, apart].sum(1)
-    return np.maximum(every / np.maximum(gram[:, apart].sum(1), 1e-12), 1.0)
+    most = sum(row.shape[1] - 1 for row in rows) ** 2
+    return (every / np.maximum(gram[:, apart].sum(1), 1e-12)).clip(1.0, most)

@@ -58,16 +58,22 @@ def whole_cells(
     What comes again about them comes again anywhere beside them. Where the frame cuts the outer ones of few
     large cells, half a step on there may be twice as many whole ones. As they are, where no more are.
     """
+    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
+    inside = torch.cartesian_prod(_INSIDE, _INSIDE)
+
+    def whole(shifts: Tensor) -> Tensor:
+        """How many cells are whole in sight after each of the shifts [S, 2]: [S]."""
+        at = shifts[:, None, None] + index[:, None] + inside  # [S, N, K, 2]
+        points, front = project(matrix, pattern.points_at(at.reshape(-1, 2), theta))
+        seen = (front & evidence.part.shows(points)).reshape(at.shape[:3])
+        return (seen.double().mean(2) >= _LEAST_KNOWN).sum(1)
+
+    if int(whole(torch.zeros(1, 2, dtype=torch.float64))) == len(index):
+        return index
     ticks = torch.arange(-0.5, 0.51, 0.25, dtype=torch.float64)
     shifts = torch.cartesian_prod(ticks, ticks)
     shifts = shifts[shifts.abs().sum(1).argsort(stable=True)]  # the least first: of equals, argmax takes it
-    inside = torch.cartesian_prod(_INSIDE, _INSIDE)
-    at = shifts[:, None, None] + index[:, None] + inside  # [S, N, K, 2]
-    matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    points, front = project(matrix, pattern.points_at(at.reshape(-1, 2), theta))
-    seen = (front & evidence.part.shows(points)).reshape(at.shape[:3])
-    whole = (seen.double().mean(2) >= _LEAST_KNOWN).sum(1)
-    return index + shifts[int(whole.argmax())]
+    return index + shifts[int(whole(shifts).argmax())]
 
 
 def sectors_of(

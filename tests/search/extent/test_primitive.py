@@ -90,15 +90,26 @@ def test_a_chequered_floor_of_which_one_colour_is_mostly_covered_is_one_all_the_
     assert lattice_error(Lattice.of(PATTERN, theta).basis, full) < 1e-6
 
 
+def told_of(ground: Fit, evidence: Evidence) -> bool:
+    index = ground.index[ground.support]
+    coset = (index.sum(1) % 2).numpy().astype(int)
+    return _told(evidence, PATTERN, _Ground(ground.theta, index), coset)
+
+
 def test_squares_know_their_kind_on_a_chequered_floor_and_do_not_where_colours_have_no_rule() -> None:
-    shares = []
     for without_rule in (False, True):
         evidence, squares = chequered_floor(without_rule=without_rule)
-        fit = fit_of(evidence, squares)
-        ground = _Ground(fit.theta, fit.index[fit.support])
-        shares.append(_told(evidence, PATTERN, ground, (ground.index.sum(1) % 2).numpy().astype(int)))
-    assert shares[0] > 0.95
-    assert shares[1] < 0.7
+        assert told_of(fit_of(evidence, squares), evidence) is not without_rule
+
+
+def test_of_a_few_squares_the_kind_is_not_known() -> None:
+    evidence, squares = chequered_floor()
+    fit = fit_of(evidence, squares)
+    middle = fit.index.median(0).values
+    near = ((fit.index - middle).abs() <= 1).all(1)
+    few = replace(fit, index=fit.index[near], contrast=fit.contrast[near])
+    assert len(few.index) == 9 and told_of(fit, evidence) and not told_of(few, evidence)
+    assert len(primitive(evidence, PATTERN, few)) == 2
 
 
 def test_the_full_cell_of_a_chequered_floor_stays() -> None:

@@ -11,6 +11,7 @@ from p3i.interp.compile import compile
 from p3i.search.config import SearchConfig
 from p3i.search.look.evidence import Evidence
 from p3i.search.look.recurrence import likelihood_ratio, recurrence_bits, rows_bits
+from p3i.search.look.sectors import whole_cells
 from p3i.vision.image import Image
 
 SIDE = 300
@@ -124,7 +125,8 @@ def test_three_hundred_that_agree_a_little_save_more_than_six_that_agree_well() 
 
 
 def rows_saved(evidence: Evidence, step: float, index: NDArray) -> float:
-    pattern = compile(parse(f"SetCameraPose(rx=0, ry=0)\n{rows(step)}\n"))
+    count = int(index.max()) + 1 if len(index) < 10 else 7
+    pattern = compile(parse(f"SetCameraPose(rx=0, ry=0)\n{rows(step, count=count)}\n"))
     return rows_bits(evidence, pattern, torch.from_numpy(index).double(), pattern.theta, focal_mm=35.0)
 
 
@@ -165,3 +167,20 @@ def test_rows_come_again_along_both_steps_or_not_at_all() -> None:
             cv2.circle(bars, (round(x + generator.uniform(-8, 8)), round(y)), 7, shown[k], -1, cv2.LINE_AA)
     assert rows_saved(picture(lattice + 0.02 * (noise(3) - 0.5)), 10, index) > 200
     assert rows_saved(picture(bars + 0.02 * (noise(3) - 0.5)), 10, index) < CHANCE
+
+
+def test_few_large_cells_that_the_frame_cuts_count_where_they_are_whole() -> None:
+    step, grey = 130, np.full((SIDE, SIDE), 0.7)  # pixels: 2.3 cells a side, of which one is whole
+    index = np.stack(np.meshgrid(np.arange(3), np.arange(3), indexing="ij"), -1).reshape(-1, 2)
+    for x, y in (index - 1) * step + (SIDE - 1) / 2:
+        cv2.ellipse(grey, (round(x), round(y)), (30, 18), 25, 0, 360, 0.1, -1, cv2.LINE_AA)
+        cv2.circle(grey, (round(x + 30), round(y + 40)), 8, 0.4, -1, cv2.LINE_AA)
+    evidence = picture(grey + 0.05 * (noise(3) - 0.5))
+    in_units = step / SIDE * 100
+    pattern = compile(parse(f"SetCameraPose(rx=0, ry=0)\n{rows(in_units, count=3)}\n"))
+    draws = torch.from_numpy(index).double()
+    moved = whole_cells(evidence, pattern, draws, pattern.theta, focal_mm=35.0)
+    assert (moved - draws).abs().tolist() == [[0.25, 0.25]] * 9  # a quarter on there are four
+    assert rows_saved(evidence, in_units, index) > 10 > rows_saved(picture(noise(4, blur=4)), in_units, index)
+    middle = draws[4:5]
+    assert torch.equal(whole_cells(evidence, pattern, middle, pattern.theta, focal_mm=35.0), middle)

@@ -1,5 +1,7 @@
 """Blocks of a compressed picture and the pixels of an enlarged one are no pattern, though they repeat."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -24,13 +26,20 @@ LOOPS = torch.cartesian_prod(*[torch.arange(-6, 7, dtype=torch.float64)] * 2)
 small = st.integers(-3, 3)
 
 
-@given(basis=st.tuples(small, small, small, small), side=st.floats(4, 40), shift=st.floats(-200, 200))
+@given(basis=st.tuples(small, small, small, small), side=st.floats(4, 16), shift=st.floats(-200, 200))
 def test_steps_of_whole_squares_lie_on_the_grid(
     basis: tuple[int, int, int, int], side: float, shift: float
 ) -> None:
     steps = torch.tensor(basis, dtype=torch.float64).reshape(2, 2)
-    assume(abs(float(torch.linalg.det(steps))) > 0.5)
+    assume(abs(float(torch.linalg.det(steps))) > 0.5 and math.gcd(*basis) == 1)
     assert on_own_grid(side * LOOPS @ steps + shift, LOOPS)
+
+
+@given(side=st.floats(18, 60), fields=st.sampled_from([((1, 0), (0, 1)), ((1, 1), (-1, 1))]))
+def test_the_fields_of_a_board_that_faces_the_camera_are_larger(
+    side: float, fields: tuple[tuple[int, int], ...]
+) -> None:
+    assert not on_own_grid(side * LOOPS @ torch.tensor(fields, dtype=torch.float64), LOOPS)
 
 
 @given(turn_deg=st.floats(2, 43), side=st.floats(8, 40))
