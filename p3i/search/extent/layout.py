@@ -19,7 +19,7 @@ from p3i.search.extent.rows import in_rows
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
-from p3i.search.fit.settle import objects_of, settled
+from p3i.search.fit.settle import registered
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.forms.layout import Layout
@@ -32,8 +32,6 @@ from p3i.search.result import Reading
 from p3i.vision.cell_bits import MISSES
 from p3i.vision.warp import in_frame
 
-# Fewer objects are not fitted once more.
-_FEWEST_REFITTED = 6
 # A proposal is shown so many steps to each side.
 _SHOWN = (-6, 7)
 # A place of the cell of at least this share of the likeliest's probability is a rival. Where both have an
@@ -208,10 +206,11 @@ def refitted(evidence: Evidence, layout: Layout) -> Layout:
     What the fit grew on had cells cut anywhere and some beyond the pattern; now each place is an object's.
     Objects at the frame count too: they lie farthest apart, and that fixes the pose.
     """
-    objects = objects_of(evidence, layout.program(from_zero=False))
-    if objects is None or len(objects.index) < _FEWEST_REFITTED:
+    program = layout.program(from_zero=False)
+    moved = registered(evidence, program)
+    if moved is program:
         return layout
-    drawn = compile(settled(objects).program())
+    drawn = compile(moved)
     if not sane(drawn, drawn.theta):
         return layout
     return replace(layout, lattice=Lattice.of(drawn, drawn.theta))

@@ -34,6 +34,8 @@ Free = Literal["focal", "lens", "bend"]
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 150
 _FEWEST = 2
+# Fewer than five do not fix a circle and its camera, nor a lattice and its, with one to spare.
+_FEWEST_REGISTERED = 6
 # Each is looked for twice, the second time in so many samples along a side.
 _CLOSER_SIDE = 24
 # A camera's numbers: how many they are, the most of one step, and their spread before anything is seen. A
@@ -208,6 +210,17 @@ def settled(objects: Objects, *free: Free) -> Settled:
         known=torch.tensor([0.0] * len(objects.numbers) + [_SPREADS[one] ** -2 for one in more]).double(),
     )
     return Settled(objects, free, fit)
+
+
+def registered(evidence: Evidence, program: Program, *, focal_mm: float | None = None) -> Program:
+    """The program with its numbers fitted once more, to where its own objects lie; as it is with few of them.
+
+    `focal_mm` is the program's own, None for the one that `evidence` assumes.
+    """
+    objects = objects_of(evidence, program, focal_mm=focal_mm)
+    if objects is None or len(objects.index) < _FEWEST_REGISTERED:
+        return program
+    return settled(objects).program()
 
 
 def saved_bits(less: Settled, more: Settled, *, share: float) -> float:
