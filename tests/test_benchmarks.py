@@ -15,6 +15,9 @@ import pytest
 import torch
 
 import p3i
+from p3i.evaluation.annotations import annotation
+from p3i.evaluation.lattice_scenes import lattice_scene
+from p3i.evaluation.truth import truth_of
 from p3i.interp.camera import Camera, project
 from p3i.search.result import StopReason, SynthesisResult
 from p3i.size import Size
@@ -127,3 +130,31 @@ def test_the_textures_lie_where_their_annotation_says() -> None:
     lattice = truth["lattice"]
     steps = (plane.numpy() * size.unit_px - lattice["base"]) @ np.linalg.inv([lattice["u"], lattice["v"]])
     assert np.allclose(steps, np.round(steps), atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_new_view_is_annotated_with_is_what_it_shows(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(SCRIPTS[0].parent))
+    views = importlib.import_module("views")
+    scene = lattice_scene(3)
+    entry = {**annotation(scene, file="a.png"), "accept_index": [1]}
+    view = views.view_of(entry, np.random.default_rng(seed))
+    photo = (255 * scene.pixels[..., ::-1]).round().astype(np.uint8)
+    shown = views.taken(photo, view, np.random.default_rng(seed))
+    assert shown.shape == (view.size.height, view.size.width, 3)
+    found = truth_of({**views.truth(entry, view), "file": "b.png"})
+    centers, size = found.readings[0], found.size
+    assert 12 <= len(centers) < len(entry["centers"]) or view.shows(entry["centers"]).all()
+    plane, _ = project(torch.linalg.inv(found.camera.image_from_plane(size)), torch.from_numpy(centers))
+    assert found.lattice is not None
+    base, basis = found.lattice
+    steps = (plane.numpy() * size.unit_px - base) @ np.linalg.inv(basis)
+    assert np.abs(steps - np.round(steps)).max() < 0.03  # pixels are told to hundredths
+    # An object is where it is said to be: the patch there is that of the photo, turned and lit anew.
+    back = np.linalg.inv(view.from_photo)
+    x, y = centers[len(centers) // 2]
+    from_x, from_y, depth = back @ [x, y, 1.0]
+    was, now = photo[round(from_y / depth), round(from_x / depth)], shown[round(y), round(x)]
+    assert np.abs(was.astype(float) - now).max() < 90
