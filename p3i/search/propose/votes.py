@@ -100,9 +100,10 @@ def ring_rounds(look: Session, best: Best) -> Iterator[list[Guess]]:
     """Rings as the focal that is assumed shows them, then, where nobody stated it, as a long one does.
 
     A closed ring says itself that its camera is right: under another one its steps do not make a whole turn.
+    And a lattice beyond noise says that there hardly is a ring at all.
     """
     yield _ring_guesses(look, look.evidence)
-    if look.focal_is_free and not best.holds_closed_ring():
+    if look.focal_is_free and not best.holds_closed_ring() and not best.holds_lattice():
         # The one half way to the longest that is believed, as lenses go.
         long_mm = math.sqrt(look.evidence.focal_mm * FOCALS_MM[1])
         yield _ring_guesses(look, look.evidence.under(long_mm))
