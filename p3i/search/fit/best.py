@@ -9,9 +9,10 @@ from p3i.search.fit.places import values_of
 from p3i.search.forms.sketches import Sketched
 from p3i.search.result import NEEDED_BITS
 
-# A program that explains more than most rings of photos do leaves nothing to a pattern of another structure:
-# on 28 photos and views of rings the best lattice was worth -38 bits.
-_MOST_OF_CURVES = 400.0
+# A program that explains more than the rings and hybrids of photos do leaves nothing to a pattern of another
+# structure; where its objects agree well, it need not explain as much.
+_BEYOND_DOUBT = 0.3
+_MOST_OF_CURVES = {True: 300.0, False: 1000.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +41,7 @@ class Best:
         Hybrids hold rings, and say more than these, however sure they are.
         """
         return not any(
-            answer.worth > _MOST_OF_CURVES
+            answer.worth > _MOST_OF_CURVES[answer.score > _BEYOND_DOUBT]
             and answer.structure != sketch.structure
             and not (sketch.structure == "hybrid" and answer.structure == "circular")
             for answer in self.asked()

@@ -11,7 +11,7 @@ from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.forms.filling import Filling
 from p3i.search.forms.sketches import sketches
 from p3i.search.forms.spelled import ring_filling
-from p3i.search.result import NEEDED_BITS
+from p3i.search.result import NEEDED_BITS, StructureFound
 
 PROGRAM = parse("SetCameraPose(rx=0, ry=0)\nfor i in range(0, 4):\n    Draw(x=9*i, y=0)\n")
 
@@ -69,3 +69,13 @@ def test_only_a_closed_ring_beyond_noise_makes_a_second_focal_needless(
     best = Best()
     best.add(ring, Drawn(RING, fit, 0.5), [Answer(RING, "circular", 0.5, bits)])
     assert best.holds_closed_ring() is holds
+
+
+@pytest.mark.parametrize("structure", ["lattice", "circular"])
+@pytest.mark.parametrize("bits", [NEEDED_BITS + 1, NEEDED_BITS - 1])
+def test_it_holds_a_lattice_where_one_is_beyond_noise(structure: StructureFound, bits: float) -> None:
+    sketch = next(one for one in sketches(SearchConfig()) if one.structure == structure)
+    best = Best()
+    answer = Answer(PROGRAM, structure, 0.5, bits)
+    best.add(sketch, Drawn(PROGRAM, None, 0.5), [answer])  # pyright: ignore[reportArgumentType]
+    assert best.holds_lattice() is (structure == "lattice" and bits > NEEDED_BITS)

@@ -92,14 +92,15 @@ def _normal(rx_deg: float, ry_deg: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("stated", "closed", "focals"),
-    [(None, False, 2), (50.0, False, 1), (None, True, 1)],
-    ids=["free", "stated", "closed"],
+    ("stated", "found", "focals"),
+    [(None, "", 2), (50.0, "", 1), (None, "holds_closed_ring", 1), (None, "holds_lattice", 1)],
+    ids=["free", "stated", "closed", "lattice"],
 )
-def test_a_long_focal_is_tried_where_nobody_stated_one_and_no_closed_ring_was_found(
-    stated: float | None, closed: bool, focals: int, monkeypatch: pytest.MonkeyPatch
+def test_a_long_focal_is_tried_where_nobody_stated_one_and_neither_closed_ring_nor_lattice_was_found(
+    stated: float | None, found: str, focals: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Best, "holds_closed_ring", lambda _: closed)
+    for name in ("holds_closed_ring", "holds_lattice"):
+        monkeypatch.setattr(Best, name, lambda _, holds=name == found: holds)
     config = SearchConfig(focal_mm=stated)
     look = Session(Evidence(DrawnRing().image(), config, stated or 35.0), config)
     told = [{guess.focal_mm for guess in guesses} for guesses in ring_rounds(look, Best())]
