@@ -34,8 +34,6 @@ Free = Literal["focal", "lens", "bend"]
 # Of more objects so many are looked for; the others are taken to be as these.
 _MOST_FOUND = 150
 _FEWEST = 2
-# Fewer than five do not fix a circle and its camera, nor a lattice and its, with one to spare.
-_FEWEST_REGISTERED = 6
 # Each is looked for twice, the second time in so many samples along a side.
 _CLOSER_SIDE = 24
 # A camera's numbers: how many they are, the most of one step, and their spread before anything is seen. A
@@ -213,12 +211,13 @@ def settled(objects: Objects, *free: Free) -> Settled:
 
 
 def registered(evidence: Evidence, program: Program, *, focal_mm: float | None = None) -> Program:
-    """The program with its numbers fitted once more, to where its own objects lie; as it is with few of them.
+    """The program with its numbers fitted once more, to where its own objects lie.
 
-    `focal_mm` is the program's own, None for the one that `evidence` assumes.
+    As it is where fewer than two objects are left beside those that the numbers take. `focal_mm` is the
+    program's own, None for the one that `evidence` assumes.
     """
     objects = objects_of(evidence, program, focal_mm=focal_mm)
-    if objects is None or len(objects.index) < _FEWEST_REGISTERED:
+    if objects is None or 2 * (len(objects.index) - 2) < len(objects.numbers):
         return program
     return settled(objects).program()
 

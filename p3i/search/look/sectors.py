@@ -25,10 +25,8 @@ ALONG = 16
 """Samples along a sector; waves up to half as many can be told."""
 ACROSS = 14
 """Samples across a sector."""
-# A sector of which less is known is none. A cell is asked whether it is in sight at these places along and
-# across.
+# A sector of which less is known is none.
 _LEAST_KNOWN = 0.7
-_INSIDE = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
 # This share of a sector's energy is told by nothing: objects and light differ.
 _UNTOLD = 0.03
 # What rounding to 8 bits leaves of three colours, each from 0 to 100: uniform over one of 255 levels.
@@ -59,7 +57,8 @@ def whole_cells(
     large cells, half a step on there may be twice as many whole ones. As they are, where no more are.
     """
     matrix = pattern.image_from_plane(theta, size=evidence.image.size, focal_mm=focal_mm)
-    inside = torch.cartesian_prod(_INSIDE, _INSIDE)
+    places = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)  # the middles of fifths of a cell
+    inside = torch.cartesian_prod(places, places)
 
     def whole(shifts: Tensor) -> Tensor:
         """How many cells are whole in sight after each of the shifts [S, 2]: [S]."""
