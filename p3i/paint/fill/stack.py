@@ -298,28 +298,25 @@ def _carry_rim(pixels: Floats, rim: Scattered, hole: Mask, placed: Placed) -> No
     _, parts, boxes, middles = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
     for number in range(1, len(boxes)):
         left, top, right, bottom = padded(boxes[number], hole.shape, by_px=_RIM_PX + 1)
-        own = np.asarray(parts, np.int32)[top:bottom, left:right]
-
-        read = partial(_rim_in, own=own, number=number, rim=rim, corner=(left, top))
+        own = parts[top:bottom, left:right] == number
+        read = partial(_rim_in, own=own, rim=rim, corner=(left, top))
         spacing = pitch_px(placed, nearest_px(placed, middles[number]))
-        for window, lift in carried_into(read, own == number, spacing_px=spacing):
+        for window, lift in carried_into(read, own, spacing_px=spacing):
             here = pixels[top:bottom, left:right][window]
             lift += here
-            put(lift, here, own[window] == number)
+            put(lift, here, own[window])
 
 
-def _rim_in(
-    window: Window, own: NDArray[np.int32], number: int, rim: Scattered, corner: tuple[int, int]
-) -> tuple[Floats, Mask]:
+def _rim_in(window: Window, own: Mask, rim: Scattered, corner: tuple[int, int]) -> tuple[Floats, Mask]:
     """What the rim of one hole lacks in a window of a larger one, [h, w, 3], and where that rim is [h, w].
 
-    The larger one lies at `corner`; `own` [H, W] numbers its holes.
+    The larger one lies at `corner`; `own` [H, W] is the hole there.
     """
     wider = wider_by(window, _RIM_PX + 1, own.shape)
     off, told = rim.read(wider, corner)
     inner = within(window, wider)
     if told.any():
-        rim_here = rim_of(own[wider] == number, told, reach_px=_RIM_PX)
+        rim_here = rim_of(own[wider], told, reach_px=_RIM_PX)
         off[told & ~rim_here] = 0
         told = rim_here
     return off[inner], told[inner]
