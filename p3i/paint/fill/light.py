@@ -153,7 +153,8 @@ def carried_into(
                 summed += _smoothed(told, sigma)[inner] / np.float32(scale)
         weight = summed[:, :, 3]
         if weight.any():
-            yield window, times(np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9), summed[:, :, :3])
+            share = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
+            yield window, times(np.asarray(share, np.float32), summed[:, :, :3])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

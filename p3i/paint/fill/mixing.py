@@ -132,7 +132,7 @@ def _of_most(read: list[tuple[Floats, Floats]], weight: Floats) -> Floats:
         total, under = np.zeros_like(here), np.full(here.shape[:2], _NOTHING)
         for colours, counts in part:
             off = cv2.transform(cv2.absdiff(colours, here), _MEAN_OF_THREE)
-            nearness = counts / (off + np.float32(_ALIKE))
+            nearness = np.asarray(counts / (off + np.float32(_ALIKE)), np.float32)
             total += times(nearness, colours)
             under += nearness
         np.divide(total, three(under), out=here)
