@@ -39,6 +39,7 @@ from p3i.size import Size
 from p3i.vision.fill import fill_in
 from p3i.vision.image import Image
 from p3i.vision.picture import Picture, opacity, reframed, repainted
+from p3i.vision.planes import put
 from p3i.vision.sheet import project
 
 Floats = NDArray[np.float32]
@@ -171,7 +172,7 @@ def extend(
     # What was transparent stays so where the pattern does not go on.
     inside, corner = _window(sides, flat.size), _window(flat.corner, flat.size)
     clear = bare[inside] & ~(flat.photo.valid | on_flat(flat, hidden))[corner] & flat.seen[corner]
-    np.copyto(pixels[inside], flat.photo.pixels[corner], where=clear[:, :, None])
+    put(flat.photo.pixels[corner], pixels[inside], clear)
     bare[inside] &= ~clear
     shown[inside] |= clear
     added = bare.copy()

@@ -26,6 +26,7 @@ from p3i.place.outlines import chart_of, polygons
 from p3i.place.placed import Placed
 from p3i.size import Size
 from p3i.vision.fill import eroded
+from p3i.vision.planes import put
 from p3i.vision.sheet import project
 from p3i.vision.strips import Window
 
@@ -174,9 +175,9 @@ def _clear(pixels: Floats, valid: Mask, placed: Placed, cut: Cutout, every: Mask
                 break
         read = partial(_lacking, here, there, rim)
         filled_in = there.copy()
-        for window, lacking in carried_into(read, rim.shape, spacing_px=spacing):
+        for window, lacking in carried_into(read, inside > 0, spacing_px=spacing):
             filled_in[window] += lacking
-        np.copyto(here, filled_in, where=(inside > 0)[:, :, None])
+        put(filled_in, here, inside > 0)
     # What is expected is needed no more: what the ground has beside its smooth part takes its place.
     detail = expected
     for channel, even in enumerate(evens):

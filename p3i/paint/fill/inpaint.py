@@ -28,6 +28,7 @@ from p3i.place.placed import Placed
 from p3i.records import changed
 from p3i.vision.image import Image, masked
 from p3i.vision.picture import Picture, opacity, repainted
+from p3i.vision.planes import put
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -131,7 +132,7 @@ def inpaint(
     if wanted.removed:
         ground, gone, said = _taken_away(flat.photo, flat.placed, flat_hole, wanted.removed)
         if hole.any():
-            np.copyto(pixels, ground, where=gone[:, :, None])
+            put(ground, pixels, gone)
         else:
             pixels = ground
         del ground  # a large photo's copies are much
@@ -143,7 +144,7 @@ def inpaint(
         pixels, parts = flat.bent(np.asarray(pixels, np.float32)), [flat.bent_mask(part) for part in parts]
     unlike, fallback, guess, strange, gone = parts
     hole = hole | (gone & photo.valid)
-    np.copyto(pixels, photo.pixels, where=~hole[:, :, None])
+    put(photo.pixels, pixels, ~hole)
     reach_px = max(3.0, _BESIDE * _typical_pitch_px(flat.placed))
     facts = facts_of(hole, unlike=unlike, guess=guess, strange=strange, ground=gone, reach_px=reach_px)
     told = [one.sentence() for one in facts if one.note]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p3i.paint.fill.even import reduction
+from p3i.vision.planes import times
 from p3i.vision.strips import Window, strips_of, wider_by, within
 
 Array = NDArray[np.float64]
@@ -53,17 +54,41 @@ def matched_light(
     M-estimator whose influence falls off), so that what is foreign around a hole tells nothing of light.
     """
     before, lifted = light if light is not None else (np.ones(3), np.zeros(3))
-    gain, offset = _closest(colours, wanted, weights, before, lifted, share)
+    both = _Both.of(colours, wanted)
+    gain, offset = _closest(both, weights, before, lifted, share)
     for _ in range(_ROUNDS if weights.any() else 0):
-        off = np.abs(gain * colours + offset - wanted).mean(1)
+        off = both.off(gain, offset)
         usual = max(_weighted_median(off, weights), _LEAST_OFF)
         robust = weights * np.minimum(1, usual / np.maximum(off, _LEAST_OFF)) ** 2
-        gain, offset = _closest(colours, wanted, robust, before, lifted, share)
+        gain, offset = _closest(both, robust, before, lifted, share)
     return gain, offset
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Both:
+    """Colours and those wanted, a row a channel as sums are fast: `own`, `other` [3, K].
+
+    `products` [15, K] are both, their squares and their products, whose means are all that a regression asks.
+    """
+
+    own: Array
+    other: Array
+    products: Array
+
+    @classmethod
+    def of(cls, colours: NDArray, wanted: NDArray) -> "_Both":
+        """For colours [K, 3] and those wanted."""
+        own, other = (np.ascontiguousarray(part.T, float) for part in (colours, wanted))
+        return cls(own, other, np.concatenate([own, other, own * own, other * other, own * other]))
+
+    def off(self, gain: Array, offset: Array) -> Array:
+        """What each place is off by under this light, [K], over the channels."""
+        first, second, third = np.abs(gain[:, None] * self.own + (offset[:, None] - self.other))
+        return (first + second + third) / 3
+
+
 def _closest(
-    colours: NDArray, wanted: NDArray, weights: NDArray, before: Array, lifted: Array, share: float
+    both: _Both, weights: NDArray, before: Array, lifted: Array, share: float
 ) -> tuple[Array, Array]:
     """The gain and offset [3] by one regression, drawn to the gain `before` and the offset `lifted`.
 
@@ -71,11 +96,12 @@ def _closest(
     make every source paler by that (attenuation; Fuller, Measurement Error Models, 1987, section 1.1), and
     their mean a second time. With as much of it on both sides the reliability is their correlation.
     """
-    parts = (weights / max(float(weights.sum()), 1e-9))[:, None].astype(float)
-    mean, wanted_mean = (parts * colours).sum(0), (parts * wanted).sum(0)
-    variance = (parts * (colours - mean) ** 2).sum(0)
-    spread = (parts * (wanted - wanted_mean) ** 2).sum(0)
-    together = np.maximum((parts * (colours - mean) * (wanted - wanted_mean)).sum(0), 0)
+    parts = weights.astype(float) / max(float(weights.sum()), 1e-9)
+    mean, wanted_mean, square, wanted_square, product = (both.products @ parts).reshape(5, 3)
+    # Without weight all of these are 0; of colours in 0..1 little is lost in the differences.
+    variance = np.maximum(square - mean * mean, 0)
+    spread = np.maximum(wanted_square - wanted_mean * wanted_mean, 0)
+    together = np.maximum(product - mean * wanted_mean, 0)
     reliable = np.minimum(together / np.sqrt(np.maximum(variance * spread, 1e-12)), 1) * variance
     prior = _PRIOR * variance + _PRIOR_VARIANCE
     prior += (1 - share) / share * variance
@@ -98,33 +124,37 @@ def rim_of(hole: NDArray, known: NDArray, *, reach_px: float) -> NDArray[np.bool
 
 
 def carried_into(
-    read: Callable[[Window], tuple[Floats, NDArray[np.bool_]]], shape: tuple[int, int], *, spacing_px: float
+    read: Callable[[Window], tuple[Floats, NDArray[np.bool_]]],
+    wanted: NDArray[np.bool_],
+    *,
+    spacing_px: float,
 ) -> Iterator[tuple[Window, Floats]]:
-    """What a rim lacks, carried smoothly to all pixels of a picture [h, w], part by part: where, and what.
+    """What a rim lacks, carried smoothly to the `wanted` pixels [h, w], part by part: where, and what.
 
     `read` gives what the rim lacks in a window, 0 beside the rim, and the rim; `spacing_px` is how far the
-    next object lies. Parts that nothing is carried into are left out.
+    next object lies. Parts in which nothing is wanted, or that nothing is carried into, are left out.
     """
-    height, width = shape
+    height, width = shape = wanted.shape
     bells = [(scale, max(_FINEST_PX, scale * _SMOOTH * spacing_px)) for scale in _SCALES]
     fine = [(scale, sigma) for scale, sigma in bells if sigma < _COARSE_SIGMA]
     coarse = _Coarse.of(read, shape, bells[len(fine) :]) if len(fine) < len(bells) else None
     reach = int(np.ceil(_REACH * fine[-1][1])) + 1 if fine else 0
     part = max(_PART_PX, 2 * reach)
     for window in ((rows, columns) for rows in strips_of(height, part) for columns in strips_of(width, part)):
+        if not wanted[window].any():
+            continue
         wider = wider_by(window, reach, shape)
         off, rim = read(wider)
         inner = within(window, wider)
         summed = np.zeros((*rim[inner].shape, 4), np.float32) if coarse is None else coarse.shown(window)
         if rim.any():
-            told = np.dstack([off, rim]).astype(np.float32)
+            told = np.asarray(cv2.merge([off, rim.astype(np.float32)]), np.float32)
             for scale, sigma in fine:
                 summed += _smoothed(told, sigma)[inner] / np.float32(scale)
-        weight = summed[:, :, 3:]
+        weight = summed[:, :, 3]
         if weight.any():
-            lift = summed[:, :, :3]
-            lift *= np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
-            yield window, lift
+            share = np.minimum(1, weight / 1e-3) / np.maximum(weight, 1e-9)
+            yield window, times(np.asarray(share, np.float32), summed[:, :, :3])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,7 +180,7 @@ class _Coarse:
             off, rim = read((rows, slice(0, width)))
             if rim.any():
                 to = slice(rows.start // reduce, -(-rows.stop // reduce))
-                small[to] = _means(np.dstack([off, rim]).astype(np.float32), reduce)
+                small[to] = _means(np.asarray(cv2.merge([off, rim.astype(np.float32)]), np.float32), reduce)
         return cls(reduce, _doubling(small, sigma / reduce, [scale for scale, _ in bells]))
 
     def shown(self, window: Window) -> Floats:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from p3i.paint.fill.ground import Ground
 from p3i.paint.fill.sources import Source
+from p3i.vision.planes import three, times
+from p3i.vision.strips import strips_of
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -27,6 +29,10 @@ _WHOLE = 0.99
 _ALIKE = 0.02
 # All sources are held side by side for so many of their pixels.
 _AT_A_TIME = 4_000_000
+# So many pixels of a picture and what is computed of them are held nearest to the processor.
+_AT_HAND = 16_384
+_NOTHING = np.float32(1e-9)
+_MEAN_OF_THREE = np.full((1, 3), 1 / 3, np.float32)
 # Grain is what is finer than this, in pixels.
 _GRAIN_PX = 1.5
 GRAIN_REACH_PX = 8
@@ -113,26 +119,31 @@ def _of_most(read: list[tuple[Floats, Floats]], weight: Floats) -> Floats:
     """What most sources show [h, w, 3]: their mean, one step of Weiszfeld (1937) towards their median.
 
     The sources are colours [h, w, 3] and how much each counts [h, w]; `weight` [h, w] is the sum of that.
+    Rows are done few at a time, so that what is in between stays in the processor's own memory.
     """
-    mean = np.zeros((*weight.shape, 3), np.float32)
-    for colours, counts in read:
-        mean += colours * counts[..., None]
-    mean /= np.maximum(weight, np.float32(1e-9))[..., None]
-    if len(read) < 3:
-        return mean
-    total, under = np.zeros_like(mean), np.full(weight.shape, 1e-9, np.float32)
-    for colours, counts in read:
-        nearness = counts / (np.abs(colours - mean).mean(2) + np.float32(_ALIKE))
-        total += colours * nearness[..., None]
-        under += nearness
-    return np.asarray(total / under[..., None], np.float32)
+    result = np.zeros((*weight.shape, 3), np.float32)
+    for rows in strips_of(len(weight), max(1, _AT_HAND // weight.shape[1])):
+        part, here = [(colours[rows], counts[rows]) for colours, counts in read], result[rows]
+        for colours, counts in part:
+            here += times(counts, colours)
+        here /= three(np.maximum(weight[rows], _NOTHING))
+        if len(read) < 3:
+            continue
+        total, under = np.zeros_like(here), np.full(here.shape[:2], _NOTHING)
+        for colours, counts in part:
+            off = cv2.transform(cv2.absdiff(colours, here), _MEAN_OF_THREE)
+            nearness = np.asarray(counts / (off + np.float32(_ALIKE)), np.float32)
+            total += times(nearness, colours)
+            under += nearness
+        np.divide(total, three(under), out=here)
+    return result
 
 
 def _sharpen(
     mean: Floats, lead: Floats, known: Floats, inside: Mask, *, energy: float, share: float | None
 ) -> float:
     """Add grain of the leading source, this share or as much as brings the mean to this energy a pixel."""
-    beyond = (lead - mean) * known[..., None]
+    beyond = times(known, lead - mean)
     beyond -= cv2.GaussianBlur(beyond, (0, 0), _GRAIN_PX)
     if share is None:
         whole = inside & (known > _WHOLE)

@@ -126,10 +126,9 @@ class Source:
             known *= read(drawn, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT)
         if not known.any():
             return None
-        colours = read(ground.pixels, cv2.INTER_CUBIC, cv2.BORDER_REPLICATE).astype(np.float32)
-        colours *= self.gain.astype(np.float32)
-        colours += self.offset.astype(np.float32)
-        return colours, known
+        colours = read(ground.pixels, cv2.INTER_CUBIC, cv2.BORDER_REPLICATE)
+        lit = cv2.transform(colours, np.column_stack([np.diag(self.gain), self.offset]))
+        return np.asarray(lit, np.float32), known
 
 
 def hole_of(points: Array, shown: Floats, known: Mask, placed: Placed, *, target: int | None = None) -> Hole:

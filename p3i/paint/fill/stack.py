@@ -32,6 +32,7 @@ from p3i.paint.fill.survey import Survey, survey_of
 from p3i.place.moves import nearest_px, pitch_px
 from p3i.place.placed import Placed
 from p3i.vision.fill import fill_in
+from p3i.vision.planes import put, three
 from p3i.vision.strips import Window, clipped, strips_of, wider_by, within
 from p3i.vision.warp import taken
 
@@ -91,7 +92,7 @@ def fill_in_place(
     _carry_rim(pixels, rim, hole, placed)
     filled = hole & shown
     for rows in strips_of(len(hole)):
-        np.copyto(pixels[rows], np.clip(pixels[rows], 0, 1), where=filled[rows][:, :, None])
+        put(np.clip(pixels[rows], 0, 1), pixels[rows], filled[rows])
     bare = hole & ~shown
     if bare.any():
         fill_in(pixels, known | filled, bare)
@@ -170,12 +171,12 @@ def _filled(
     shown, edges = np.zeros_like(hole), list[Scattered]()
     for strip in summed(hole.shape, added()):
         shown[strip.rows] = found = strip.weight > _SHOWN
-        strip.total[...] /= np.maximum(strip.weight, _SHOWN)[:, :, None]
+        strip.total[...] /= three(np.maximum(strip.weight, _SHOWN))
         # What sources are read with where known ground ends stays 0 until all pieces are painted.
         edge = near_rims(hole, strip.rows, outwards=_RIM_PX, inwards=_READ_PX)
         edges.append(Scattered.of(strip.total, edge & found, top=strip.rows.start))
         inner = hole[strip.rows] & found & ~edge
-        np.copyto(pixels[strip.rows], strip.total, where=inner[:, :, None])
+        put(strip.total, pixels[strip.rows], inner)
     edge = Scattered.joined(edges)
     edge.part(hole).write_to(pixels)
     return shown, edge.part(~hole & (ground.sure > 0))
@@ -297,24 +298,25 @@ def _carry_rim(pixels: Floats, rim: Scattered, hole: Mask, placed: Placed) -> No
     _, parts, boxes, middles = cv2.connectedComponentsWithStats(hole.astype(np.uint8), connectivity=8)
     for number in range(1, len(boxes)):
         left, top, right, bottom = padded(boxes[number], hole.shape, by_px=_RIM_PX + 1)
-        own = np.asarray(parts, np.int32)[top:bottom, left:right]
-
-        read = partial(_rim_in, own=own, number=number, rim=rim, corner=(left, top))
+        own = parts[top:bottom, left:right] == number
+        read = partial(_rim_in, own=own, rim=rim, corner=(left, top))
         spacing = pitch_px(placed, nearest_px(placed, middles[number]))
-        for window, lift in carried_into(read, own.shape, spacing_px=spacing):
+        for window, lift in carried_into(read, own, spacing_px=spacing):
             here = pixels[top:bottom, left:right][window]
-            np.add(here, lift, out=here, where=(own[window] == number)[:, :, None])
+            lift += here
+            put(lift, here, own[window])
 
 
-def _rim_in(
-    window: Window, own: NDArray[np.int32], number: int, rim: Scattered, corner: tuple[int, int]
-) -> tuple[Floats, Mask]:
+def _rim_in(window: Window, own: Mask, rim: Scattered, corner: tuple[int, int]) -> tuple[Floats, Mask]:
     """What the rim of one hole lacks in a window of a larger one, [h, w, 3], and where that rim is [h, w].
 
-    The larger one lies at `corner`; `own` [H, W] numbers its holes.
+    The larger one lies at `corner`; `own` [H, W] is the hole there.
     """
     wider = wider_by(window, _RIM_PX + 1, own.shape)
     off, told = rim.read(wider, corner)
     inner = within(window, wider)
-    rim_here = rim_of(own[wider] == number, told, reach_px=_RIM_PX)[inner]
-    return off[inner] * rim_here[:, :, None], rim_here
+    if told.any():
+        rim_here = rim_of(own[wider], told, reach_px=_RIM_PX)
+        off[told & ~rim_here] = 0
+        told = rim_here
+    return off[inner], told[inner]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from p3i.vision.planes import times
 from p3i.vision.strips import ROWS, Window
 
 Floats = NDArray[np.float32]
@@ -41,7 +42,7 @@ def summed(shape: tuple[int, int], added: Iterable[tuple[Window, tuple[Floats, F
     for (rows, columns), (colours, weights) in added:
         done = [number for number in sorted(open_) if (number + 1) * ROWS <= rows.start]
         yield from (open_.pop(number) for number in done)
-        colours *= weights[..., None]
+        colours = times(weights, colours)
         for number in range(rows.start // ROWS, -(-rows.stop // ROWS)):
             strip = opened(number)
             first, last = max(rows.start, strip.rows.start), min(rows.stop, strip.rows.stop)

@@ -15,7 +15,7 @@ def carried(off: np.ndarray, rim: np.ndarray, *, spacing_px: float) -> np.ndarra
         return off[window], rim[window]
 
     found = np.zeros_like(off)
-    for window, lift in carried_into(read, rim.shape, spacing_px=spacing_px):
+    for window, lift in carried_into(read, np.ones_like(rim), spacing_px=spacing_px):
         found[window] += lift
     return found
 
