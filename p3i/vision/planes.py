@@ -16,7 +16,7 @@ Mask = NDArray[np.bool_]
 
 def three(plane: Floats) -> Floats:
     """A plane [H, W] as three channels alike: [H, W, 3]."""
-    return np.asarray(cv2.merge([plane] * 3)).reshape(*plane.shape, 3)
+    return np.asarray(cv2.merge([plane] * 3), np.float32).reshape(*plane.shape, 3)
 
 
 def times(plane: Floats, picture: Floats) -> Floats:
