@@ -27,7 +27,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from p3i.interp.camera import DEFAULT_FOCAL_MM, FILM_MM, Camera
+from p3i.interp.camera import DEFAULT_FOCAL_MM, Camera
 from p3i.size import Size
 
 Array = NDArray[np.float64]
@@ -49,7 +49,8 @@ class View:
 
     def places(self, points: object) -> Array:
         """Where pixels of the photo [N, 2] lie on the view, [N, 2]; what is behind the camera at infinity."""
-        seen = np.column_stack([np.array(points, float), np.ones(len(np.array(points)))]) @ self.from_photo.T
+        at = np.array(points, float)
+        seen = np.column_stack([at, np.ones(len(at))]) @ self.from_photo.T
         return np.where(seen[:, 2:] > 0, seen[:, :2] / seen[:, 2:], np.inf)
 
     def shows(self, points: object) -> NDArray[np.bool_]:
@@ -138,7 +139,7 @@ def _turned_to(at: Array, size: Size, focal_mm: float, *, span: float, random: R
 
 
 def _lens(size: Size, focal_mm: float) -> Array:
-    focal_px = focal_mm / FILM_MM * size.longer
+    focal_px = Camera(focal_mm=focal_mm).focal_px(size)
     return np.array([[focal_px, 0, size.middle[0]], [0, focal_px, size.middle[1]], [0, 0, 1.0]])
 
 

@@ -8,7 +8,7 @@ from p3i.search.extent.ring import drawn_ring
 from p3i.search.extent.setting import drawn_as_asked
 from p3i.search.fit.fitted import Drawn, Fit
 from p3i.search.fit.places import curve_score
-from p3i.search.fit.settle import registered
+from p3i.search.fit.settle import with_settled_numbers
 from p3i.search.forms.guess import Base
 from p3i.search.forms.sketches import Sketched
 from p3i.search.look.session import Session
@@ -23,7 +23,9 @@ def drawn(look: Session, sketch: Sketched, fit: Fit, base: Base | None) -> Drawn
     if sketch.structure == "lattice":
         return drawn_lattice(look, fit)
     found = drawn_ring(look, fit) if base is None else _drawn_rings(look, fit, base)
-    return replace(found, program=registered(look.evidence, found.program, focal_mm=found.fit.focal_mm))
+    return replace(
+        found, program=with_settled_numbers(look.evidence, found.program, focal_mm=found.fit.focal_mm)
+    )
 
 
 def _drawn_rings(look: Session, fit: Fit, base: Base) -> Drawn:

@@ -19,7 +19,7 @@ from p3i.search.extent.rows import in_rows
 from p3i.search.fit.fitted import Fit
 from p3i.search.fit.grow import sane, side_of_cell, weighed
 from p3i.search.fit.judged import judged_cells
-from p3i.search.fit.settle import registered
+from p3i.search.fit.settle import with_settled_numbers
 from p3i.search.forms.guess import Guess
 from p3i.search.forms.lattice import Lattice, cell_corners, cells_in_view
 from p3i.search.forms.layout import Layout
@@ -207,7 +207,7 @@ def refitted(evidence: Evidence, layout: Layout) -> Layout:
     Objects at the frame count too: they lie farthest apart, and that fixes the pose.
     """
     program = layout.program(from_zero=False)
-    moved = registered(evidence, program)
+    moved = with_settled_numbers(evidence, program)
     if moved is program:
         return layout
     drawn = compile(moved)

@@ -210,7 +210,7 @@ def settled(objects: Objects, *free: Free) -> Settled:
     return Settled(objects, free, fit)
 
 
-def registered(evidence: Evidence, program: Program, *, focal_mm: float | None = None) -> Program:
+def with_settled_numbers(evidence: Evidence, program: Program, *, focal_mm: float | None = None) -> Program:
     """The program with its numbers fitted once more, to where its own objects lie.
 
     As it is where fewer than two objects are left beside those that the numbers take. `focal_mm` is the

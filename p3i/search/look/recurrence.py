@@ -142,16 +142,9 @@ def _with_all_others(products: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 def _bits_of(products: NDArray[np.complex64], untold: float) -> float:
     """The bits of sectors whose waves have these products [M, N, N]; the lowest waves that say most count."""
-    number = products.shape[1]
-    shared, samples = _shared(products), _independent(products)
-    best = 0.0
-    for last in range(1, len(shared) + 1):
-        total = samples[:last].sum()
-        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - untold)
-        if share > 1 / number:
-            best = max(best, float(total) * likelihood_ratio(share, number))
+    saved = _by_lowest_waves(products, _independent(products), untold)
     # One of so many choices was made.
-    return max(0.0, best - math.log2(len(shared)))
+    return max(0.0, max(saved) - math.log2(len(saved)))
 
 
 def _bits_of_rows(sectors: Sectors, rows: list[NDArray[np.intp]]) -> float:
@@ -168,14 +161,27 @@ def _bits_of_rows(sectors: Sectors, rows: list[NDArray[np.intp]]) -> float:
     saved = np.zeros(len(by_wave))
     for row in rows:
         own = by_wave[:, row]
-        shared = _shared(own @ np.conj(np.swapaxes(own, 1, 2)))
-        told = np.minimum(np.cumsum(shared * samples) / np.cumsum(samples), 1 - sectors.untold)
-        saved += [
-            total * likelihood_ratio(share, len(row)) if share > 1 / len(row) else 0.0
-            for total, share in zip(np.cumsum(samples), told, strict=True)
-        ]
+        saved += _by_lowest_waves(own @ np.conj(np.swapaxes(own, 1, 2)), samples, sectors.untold)
     # The lowest waves that say most count, one of so many choices.
     return max(0.0, float(saved.max()) - math.log2(len(saved)))
+
+
+def _by_lowest_waves(
+    products: NDArray[np.complex64], samples: NDArray[np.float64], untold: float
+) -> list[float]:
+    """The bits that sectors save by their first wave, by the first two, and so on: M numbers.
+
+    `products` [M, N, N] are those of their waves, of which each has so many independent `samples` [M].
+    """
+    number = products.shape[1]
+    energy = np.diagonal(products, axis1=1, axis2=2).real.sum(1)
+    shared = products.sum((1, 2)).real / (number * np.maximum(energy, 1e-12))  # by the mean sector
+    saved = []
+    for last in range(1, len(shared) + 1):
+        total = samples[:last].sum()
+        share = min(float((shared[:last] * samples[:last]).sum() / total), 1 - untold)
+        saved.append(float(total) * likelihood_ratio(share, number) if share > 1 / number else 0.0)
+    return saved
 
 
 def likelihood_ratio(share: float, number: int) -> float:
@@ -186,12 +192,6 @@ def likelihood_ratio(share: float, number: int) -> float:
     left = number - 1
     nats = -number * math.log(number) - math.log(share) - left * math.log(1 - share) + left * math.log(left)
     return nats / math.log(2)
-
-
-def _shared(products: NDArray[np.complex64]) -> NDArray[np.float64]:
-    """The share of all energy that the mean of sectors has, by their products [M, N, N]: [M]."""
-    energy = np.diagonal(products, axis1=1, axis2=2).real.sum(1)
-    return products.sum((1, 2)).real / (products.shape[1] * np.maximum(energy, 1e-12))
 
 
 def _independent(products: NDArray[np.complex64]) -> NDArray[np.float64]:
